@@ -250,6 +250,8 @@ fn an_arm_that_is_not_as_its_model_says_never_moves() {
         ("stiffness = 200.0", "--control 1", "[]"),
         ("controller = '127.0.0.2'", "", "[]"),
         ("", "--only-monitor", "[]"),
+        // It is not at the start of the bench: the second joint is 0.2 rad away.
+        ("start = [0.0, 0.7, 0.0, -1.3, 0.0, 1.3, 0.0]", "", "[]"),
     ];
     let runs = cases.map(|(more, args, events)| {
         thread::spawn(move || {
@@ -265,6 +267,26 @@ fn an_arm_that_is_not_as_its_model_says_never_moves() {
         })
     });
     runs.into_iter().for_each(|run| run.join().unwrap());
+}
+
+#[test]
+fn a_run_begins_at_its_start_and_goes_on_anywhere_after_a_stop() {
+    // The second joint is 0.08 rad from the start, and the first one is farther away when the session drops.
+    let start = "start = [0.0, 0.58, 0.0, -1.3, 0.0, 1.3, 0.0]";
+    let (mut rig, mut krc) =
+        pair(start, "--seconds 20 --restart-s 0.2 --until-silent", r#"[{"at": 1.2, "do": "monitor"}]"#);
+    let first = |rig: &LinkRig| rig.get::<Joints>("position").map_or(0.0, |joints| joints.0[0]);
+    assert!(drive(&mut rig, SPEED, true, |rig| first(rig) > 0.12 && krc.has_said(|said| said["what"] == "monitor")));
+    let before = first(&rig);
+    assert!(drive(&mut rig, SPEED, true, |rig| follows(rig) && first(rig) > before + 0.05), "{:?}", rig.refusal());
+    rig.stop().unwrap();
+    // Elsewhere it is refused with both values, and the way out.
+    let (mut rig, _krc) = pair("start = [0.0, 0.7, 0.0, -1.3, 0.0, 1.3, 0.0]", "--seconds 20 --until-silent", "[]");
+    assert!(drive(&mut rig, SPEED, false, |rig| rig.refusal().is_some_and(|why| why.contains("`start`"))));
+    let why = rig.refusal().unwrap();
+    assert!(why.contains("joint `lwr_a2_joint` is at 0.5030 rad, but `start` is 0.7000 rad"), "{why}");
+    assert!(why.contains("Guide the arm there, raise `start_bounds.posture`, or leave out `start`"), "{why}");
+    rig.stop().unwrap();
 }
 
 #[test]

@@ -215,6 +215,11 @@ fn what_is_wrong_before_the_first_velocity_keeps_the_program_from_the_robot() {
             "the payload of the robot is 1.500 kg, but `tool_mass` is 0.500 kg",
         ),
         (json!({ "slider": 0.5 }), "", "the speed slider is at 50 %"),
+        (
+            json!({}),
+            "start = [0.0, -1.7, -2.0, -1.0124, 1.45, 0.0]",
+            "joint `wrist_2_joint` is at 1.5708 rad, but `start` is 1.4500 rad: they differ by more than 0.1 rad",
+        ),
         (json!({ "safety_mode": 2 }), "", "the robot is in reduced mode"),
         (json!({ "robot_mode": 5 }), "", "the robot is not running but idle"),
         (json!({ "remote": false }), "start_s = 0.3", "within 300ms: switch it to remote control"),

@@ -74,6 +74,20 @@ fn a_robot_that_was_ready_is_checked_again_when_the_operator_resumes() {
 }
 
 #[test]
+fn a_robot_begins_at_its_start_and_goes_on_anywhere_after_a_stop() {
+    let mut peer = Peer::start(json!({}));
+    let mut rig = peer.rig("start = [0.0, -1.7, -2.0, -1.0124, 1.5, 0.0]\nstart_bounds = { posture = 0.08 }");
+    move_until(&mut rig, |rig| follows(rig) && is_moving(&peer, 0.0));
+    let is_far = |rig: &LinkRig| rig.get::<Joints>("position").is_some_and(|joints| joints.0[0].abs() > 0.1);
+    move_until(&mut rig, is_far);
+    let rests = |_: &LinkRig| peer.events().iter().rev().find_map(|event| event["speed"].as_f64()) == Some(0.0);
+    assert!(rig.wait_until(SOON, rests));
+    let later = peer.tell("set slider 1.0");
+    move_until(&mut rig, |rig| follows(rig) && is_moving(&peer, later));
+    rig.stop().unwrap();
+}
+
+#[test]
 fn a_robot_that_sends_packets_without_a_sample_is_lost() {
     let mut peer = Peer::start(json!({}));
     let mut rig = peer.rig("silence_s = 0.3");

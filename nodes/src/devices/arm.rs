@@ -111,6 +111,19 @@ pub(crate) fn check_posture(param: &str, posture: &[f64], joints: &[Joint]) -> R
     }))
 }
 
+/// Returns the joints of a real arm, which may be anywhere when a run begins if the bench does not state its `start`.
+///
+/// # Errors
+/// Those of `joints`, if a start is given.
+#[cfg(feature = "drivers")]
+pub(crate) fn live_joints(chain: &Chain, acceleration: f64, start: Option<&[f64]>) -> Result<JointsShape, Mistakes> {
+    if let Some(start) = start {
+        return joints(chain, acceleration, start);
+    }
+    let of_model = |joint: &Joint| Joint { acceleration, start: None, ..joint.clone() };
+    Ok(JointsShape { joints: chain.joints().iter().map(of_model).collect(), unit: Unit::RADIAN })
+}
+
 /// Checks that every commanded velocity is finite.
 ///
 /// # Errors

@@ -27,11 +27,14 @@ pub struct StartBounds {
     /// Maximum angle between the tip that the model computes and the one that the robot reports.
     #[param(unit = "rad", above = 0.0, usual = 0.0..=USUAL_RAD, default = 0.0175)]
     pub tip_angle: f64,
+    /// Maximum difference between the position of a joint and `start` when a run begins.
+    #[param(unit = "rad", above = 0.0, usual = 0.0..=USUAL_RAD, default = 0.1)]
+    pub posture: f64,
 }
 
 impl StartBounds {
-    /// 0.05 rad, 2 mm and 1°.
-    pub const DEFAULT: Self = Self { deflection: 0.05, tip: 0.002, tip_angle: 0.0175 };
+    /// 0.05 rad, 2 mm and 1°, and 0.1 rad from `start`.
+    pub const DEFAULT: Self = Self { deflection: 0.05, tip: 0.002, tip_angle: 0.0175, posture: 0.1 };
 }
 
 /// What a controller reports of a still arm, and what the driver would command.
@@ -48,6 +51,8 @@ pub(crate) struct StartReport<'r> {
     pub(crate) held: Option<&'r [f64]>,
     /// The pose of the tip in the base that the robot reports for the measured posture, if it does [m].
     pub(crate) tip: Option<IsometryMatrix3<f64>>,
+    /// Whether the arm has not followed commands in this run.
+    pub(crate) is_first: bool,
 }
 
 /// Compares what a controller reports with the model of its arm.
@@ -55,12 +60,14 @@ pub(crate) struct StartReport<'r> {
 pub(crate) struct StartCheck {
     chain: Chain,
     bounds: StartBounds,
+    /// The posture from which runs begin, if the bench states one [rad].
+    start: Option<Vec<f64>>,
 }
 
 impl StartCheck {
-    /// `chain` ends at the tip whose pose the robot reports.
-    pub(crate) const fn new(chain: Chain, bounds: StartBounds) -> Self {
-        Self { chain, bounds }
+    /// `chain` ends at the tip whose pose the robot reports, and `start` has an entry for each of its joints.
+    pub(crate) const fn new(chain: Chain, bounds: StartBounds, start: Option<Vec<f64>>) -> Self {
+        Self { chain, bounds, start }
     }
 
     /// Checks a report. Call it before the first command, and again before the first command after the controller was
@@ -70,6 +77,9 @@ impl StartCheck {
     /// The first difference that is too large, with both values and what to correct.
     pub(crate) fn check(&self, report: &StartReport<'_>) -> Result<(), DeviceError> {
         self.check_postures(report)?;
+        if report.is_first {
+            self.check_start(report.measured)?;
+        }
         report.tip.as_ref().map_or(Ok(()), |tip| self.check_tip(report.measured, tip))
     }
 
@@ -94,13 +104,26 @@ impl StartCheck {
                 let message = format!(
                     "joint `{name}` is at {measured:.4} rad, but the controller commands {commanded:.4} rad: they differ \
                      by more than {bound} rad{}. Free the arm, check the load data of the tool, or raise \
-                     `start.deflection`",
+                     `start_bounds.deflection`",
                     report.held.map_or_else(String::new, |_| format!(", and by {held:.4} rad when it moved last"))
                 );
                 return Err(DeviceError(message));
             }
         }
         Ok(())
+    }
+
+    fn check_start(&self, measured: &[f64]) -> Result<(), DeviceError> {
+        let bound = self.bounds.posture;
+        let joints = self.chain.joints().iter().zip(measured).zip(self.start.iter().flatten());
+        let far = joints.into_iter().find(|((_, measured), start)| (*measured - *start).abs() > bound);
+        far.map_or(Ok(()), |((joint, measured), start)| {
+            Err(DeviceError(format!(
+                "joint `{}` is at {measured:.4} rad, but `start` is {start:.4} rad: they differ by more than {bound} rad. \
+                 Guide the arm there, raise `start_bounds.posture`, or leave out `start`",
+                joint.name
+            )))
+        })
     }
 
     fn check_tip(&self, measured: &[f64], reported: &IsometryMatrix3<f64>) -> Result<(), DeviceError> {
@@ -142,7 +165,7 @@ mod tests {
     fn check() -> StartCheck {
         let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../graphs/robots/ur5e.urdf").into();
         let chain = load(&FilePath { path, span: 0..0, builtin: None }, "tool0", &Mount::NONE).unwrap();
-        StartCheck::new(chain, StartBounds::DEFAULT)
+        StartCheck::new(chain, StartBounds::DEFAULT, Some(HOME.to_vec()))
     }
 
     fn tip(check: &StartCheck) -> IsometryMatrix3<f64> {
@@ -154,7 +177,7 @@ mod tests {
         let mut postures = [HOME; 3];
         postures[which][2] += by;
         let [measured, commanded, target] = &postures;
-        check().check(&StartReport { measured, commanded, target, held: None, tip: None })
+        check().check(&StartReport { measured, commanded, target, held: None, tip: None, is_first: false })
     }
 
     #[test]
@@ -184,6 +207,7 @@ mod tests {
                 target: &commanded,
                 held: Some(&held),
                 tip: None,
+                is_first: false,
             };
             check.check(&report).map_err(|error| error.0)
         };
@@ -203,13 +227,55 @@ mod tests {
             let turn = Rotation3::from_axis_angle(&Vector3::x_axis(), turn.to_radians());
             let at = tip(&check);
             let tip = IsometryMatrix3::from_parts(shift * at.translation, turn * at.rotation);
-            check.check(&StartReport { measured: &HOME, commanded: &HOME, target: &HOME, held: None, tip: Some(tip) })
+            check.check(&StartReport {
+                measured: &HOME,
+                commanded: &HOME,
+                target: &HOME,
+                held: None,
+                tip: Some(tip),
+                is_first: true,
+            })
         };
         assert_eq!(reports(0.9, 0.0019), Ok(()));
         let away = reports(0.0, 0.0021).unwrap_err().0;
         assert!(away.contains("they are 2.1 mm and 0.0° apart, and the maximum is 2.0 mm and 1.0°"), "{away}");
         assert!(reports(1.1, 0.0).is_err());
         assert!(reports(0.0, f64::NAN).is_err());
+    }
+
+    #[test]
+    fn a_run_begins_near_its_start_and_goes_on_anywhere() {
+        let check = check();
+        let at = |by: f64, is_first: bool| {
+            let mut measured = HOME;
+            measured[4] += by;
+            let report = StartReport {
+                measured: &measured,
+                commanded: &measured,
+                target: &measured,
+                held: None,
+                tip: None,
+                is_first,
+            };
+            check.check(&report)
+        };
+        assert_eq!(at(0.099, true), Ok(()));
+        assert_eq!(at(-0.101, false), Ok(()), "it has moved in this run");
+        let far = at(-0.101, true).unwrap_err().0;
+        let message =
+            "joint `wrist_2_joint` is at 1.4690 rad, but `start` is 1.5700 rad: they differ by more than 0.1 rad";
+        assert!(far.starts_with(message), "{far}");
+        assert!(far.contains("Guide the arm there") && far.ends_with("or leave out `start`"), "{far}");
+        let without = StartCheck { start: None, ..check.clone() };
+        let report = StartReport {
+            measured: &[0.0; 6],
+            commanded: &[0.0; 6],
+            target: &[0.0; 6],
+            held: None,
+            tip: None,
+            is_first: true,
+        };
+        assert_eq!(without.check(&report), Ok(()));
     }
 
     /// A rotation whose numbers are rounded to single precision is not orthonormal in double precision.
@@ -221,12 +287,14 @@ mod tests {
             let mut tip = check.chain.forward(&measured, &mut [Twist::default(); 6]).0;
             let rounded = tip.rotation.matrix().map(|entry| f64::from(entry as f32));
             tip.rotation = Rotation3::from_matrix_unchecked(rounded);
+            let tip = Some(tip);
             let report = StartReport {
                 measured: &measured,
                 commanded: &measured,
                 target: &measured,
                 held: None,
-                tip: Some(tip),
+                tip,
+                is_first: false,
             };
             assert_eq!(check.check(&report), Ok(()), "{i}");
         }
@@ -238,7 +306,8 @@ mod tests {
         let mut swapped = HOME;
         swapped.swap(0, 2);
         let tip = Some(tip(&check));
-        let report = StartReport { measured: &swapped, commanded: &swapped, target: &swapped, held: None, tip };
+        let report =
+            StartReport { measured: &swapped, commanded: &swapped, target: &swapped, held: None, tip, is_first: false };
         let message = check.check(&report).unwrap_err().0;
         assert!(message.contains("the order of the joints"), "{message}");
     }

@@ -406,6 +406,7 @@ impl Fri {
             target: self.target.position(),
             held: self.held.as_ref().map(|held| &held[..]),
             tip: Some(report.pose),
+            is_first: !self.has_followed,
         };
         self.check.check(&start).err().map(|error| error.0)
     }

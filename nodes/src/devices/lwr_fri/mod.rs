@@ -15,7 +15,6 @@ use std::net::IpAddr;
 
 use tactflow_runtime::device::{Description, Device, Driver, OnSilence, Opened};
 use tactflow_runtime::node::{Describe, FilePath, Map, Mistake, Mistakes, Param, collect_both, refuse_any};
-use tactflow_runtime::signal::{Joint, JointsShape, Unit};
 
 use super::arm::{self, ArmPorts};
 use super::pad;
@@ -70,9 +69,13 @@ pub struct Params {
     /// Integers for the KRL program at the end of the run, so that it leaves the state command.
     #[param(unit = "1", default = Map(Default::default()))]
     krl_ints_at_end: Map<f64>,
+    /// Posture from which runs begin. A run refuses to move an arm that is elsewhere, and the check
+    /// knows where the sensor starts.
+    #[param(unit = "rad")]
+    start: Option<Vec<f64>>,
     /// Bounds of the checks before the first command.
     #[param(default = StartBounds::DEFAULT)]
-    start: StartBounds,
+    start_bounds: StartBounds,
     /// Time that the controller has to reach the state command after it has sent its first measurement. The arm rests
     /// meanwhile.
     #[param(unit = "s", range = 0.0.., default = 10.0)]
@@ -100,8 +103,10 @@ pub struct Params {
 /// motion. A step is never longer than `max_step`, and ends at the limits of the joints.
 ///
 /// **Start.** Before each motion from the state monitor, the device compares the commanded posture with the measured
-/// one, and the pose of the tool with the model. A difference that is greater than `start` allows refuses the motion. An
-/// arm that is deflected because it presses goes on after a halt, unless its deflection has changed by more than that.
+/// one, and the pose of the tool with the model. A difference that is greater than `start_bounds` allows refuses the
+/// motion. An arm that is deflected because it presses goes on after a halt, unless its deflection has changed by more
+/// than that. If the bench states `start`, the first motion of a run begins there: the device refuses it as long as a
+/// joint is farther than `start_bounds.posture` from `start`.
 /// The arm rests until the controller reaches the state command for the first time, for `wait_s` at most.
 ///
 /// **Safety.** A drop to monitor, drives that are off, an error, a wrong control mode and a quality below ok stop the
@@ -164,15 +169,12 @@ fn opened(params: Params) -> Result<(Description, Fri), Mistakes> {
         per_joint("damping_ratio", params.damping_ratio.as_ref()),
     )?;
     let allowed = params.controller.as_deref().map(address).transpose()?;
-    let joints = chain.joints().iter();
-    let joints: Vec<Joint> =
-        joints.map(|joint| Joint { acceleration: params.acceleration, start: None, ..joint.clone() }).collect();
-    let target = Target::new(Bounds::new(&joints, params.max_step.unwrap_or(f64::INFINITY)));
+    let shape = arm::live_joints(&chain, params.acceleration, params.start.as_deref())?;
+    let target = Target::new(Bounds::new(&shape.joints, params.max_step.unwrap_or(f64::INFINITY)));
     let mut description = Description::every(params.sample_ms * 1e-3);
     description.on_silence(OnSilence::Stops, params.silence_ms * 1e-3);
     description.needs_commissioning = true;
     let facts = arm::facts(&params.urdf, &params.tip, params.home.as_deref())?;
-    let shape = JointsShape { joints, unit: Unit::RADIAN };
     let ports = ArmPorts::fill(&mut description, &shape, facts);
     let weight = ToolWeight::new(params.tool_mass, params.tool_com);
     let force = WrenchPorts::fill(&mut description, [vec![pad::mount(&Mount::NONE)], weight.facts()].concat());
@@ -186,7 +188,7 @@ fn opened(params: Params) -> Result<(Description, Fri), Mistakes> {
         tool: params.tool.pose(),
         weight,
     };
-    let check = StartCheck::new(load(&params.urdf, &params.tip, &params.tool)?, params.start);
+    let check = StartCheck::new(load(&params.urdf, &params.tip, &params.tool)?, params.start_bounds, params.start);
     Ok((description, Fri::new(settings, ports, force, target, check, chain, allowed)))
 }
 

@@ -50,6 +50,11 @@ fn bad_settings() {
     let cases = [
         ("stiffness = [200, 200]", "the list has 2 entries, but the arm has 7 joints"),
         ("home = [0, 0]", "`home` has 2 entries, but the arm has 7 joints"),
+        ("start = [0, 0]", "`start` has 2 entries, but the arm has 7 joints"),
+        (
+            "start = [0, 3, 0, 0, 0, 0, 0]",
+            "joint `lwr_a2_joint` cannot start at 3: its range is -2.0944 to 2.0944 (rad, or m if prismatic)",
+        ),
         ("krl_ints = { 17 = 1 }", "`17` is no number of an integer of KRL: they are 1 to 16"),
         ("krl_ints = { x = 1 }", "`x` is no number of an integer of KRL: they are 1 to 16"),
         ("krl_ints_at_end = { 2 = 0.5 }", "integer 2 of KRL cannot be 0.5: write a whole number of 32 bits"),

@@ -21,17 +21,18 @@ pub(super) struct Checks {
 }
 
 impl Checks {
-    /// Checks the state of a still robot.
+    /// Checks the state of a still robot. `is_first` is whether it has not followed commands in this run.
     ///
     /// # Errors
     /// What is wrong, and what to correct.
-    pub(super) fn check(&self, state: &State) -> Result<(), String> {
+    pub(super) fn check(&self, state: &State, is_first: bool) -> Result<(), String> {
         self.check_payload(state)?;
         let [measured, commanded] = [state.q, state.target_q].map(|q| in_order(&self.order, &q));
         let offset = state.tcp_offset.or(self.tcp_offset);
         let tip = geometry::flange(&self.base, state.tcp_pose, offset.unwrap_or_default());
+        let tip = Some(tip);
         let report =
-            StartReport { measured: &measured, commanded: &commanded, target: &commanded, held: None, tip: Some(tip) };
+            StartReport { measured: &measured, commanded: &commanded, target: &commanded, held: None, tip, is_first };
         self.start.check(&report).map_err(|error| match offset {
             Some(_) => error.0,
             None => format!("{}. The robot does not report its TCP offset: write it as `tcp_offset`", error.0),
@@ -83,7 +84,7 @@ mod tests {
     fn checks() -> Checks {
         let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../graphs/robots/ur5e.urdf").into();
         let chain = load(&FilePath { path, span: 0..0, builtin: None }, "tool0", &Mount::NONE).unwrap();
-        let start = StartCheck::new(chain, StartBounds::DEFAULT);
+        let start = StartCheck::new(chain, StartBounds::DEFAULT, None);
         Checks { start, order: ORDER, base: geometry::base(0.0), tcp_offset: None, tool_mass: None }
     }
 
@@ -96,21 +97,21 @@ mod tests {
 
     #[test]
     fn the_pose_of_the_robot_is_compared_with_the_model() {
-        assert_eq!(checks().check(&stretched()), Ok(()));
+        assert_eq!(checks().check(&stretched(), true), Ok(()));
         let mut moved = stretched();
         moved.tcp_pose[2] += 0.003;
-        let why = checks().check(&moved).unwrap_err();
+        let why = checks().check(&moved, true).unwrap_err();
         assert!(why.contains("3.0 mm") && why.ends_with("write it as `tcp_offset`"), "{why}");
         moved.tcp_offset = Some([0.0; 6]);
-        assert!(checks().check(&moved).unwrap_err().ends_with("set on the controller"));
+        assert!(checks().check(&moved, true).unwrap_err().ends_with("set on the controller"));
         // A tool of 0.1 m along the z of the flange, which is -y of the base.
         let mut tool = stretched();
         tool.tcp_pose[1] -= 0.1;
-        assert!(checks().check(&tool).is_err());
+        assert!(checks().check(&tool, true).is_err());
         tool.tcp_offset = Some([0.0, 0.0, 0.1, 0.0, 0.0, 0.0]);
-        assert_eq!(checks().check(&tool), Ok(()));
+        assert_eq!(checks().check(&tool, true), Ok(()));
         let known = Checks { tcp_offset: tool.tcp_offset.take(), ..checks() };
-        assert_eq!(known.check(&tool), Ok(()));
+        assert_eq!(known.check(&tool, true), Ok(()));
     }
 
     #[test]
@@ -120,16 +121,16 @@ mod tests {
         // about z after a quarter turn about x is a half turn about the axis between y and z.
         let axis = PI * 0.5f64.sqrt();
         turned.tcp_pose = [0.8172, 0.2329, 0.0628, 0.0, axis, axis];
-        assert!(checks().check(&turned).is_err());
-        assert_eq!(Checks { base: geometry::base(PI), ..checks() }.check(&turned), Ok(()));
+        assert!(checks().check(&turned, true).is_err());
+        assert_eq!(Checks { base: geometry::base(PI), ..checks() }.check(&turned, true), Ok(()));
     }
 
     #[test]
     fn the_payload_must_be_that_of_the_tool() {
         let checks = Checks { tool_mass: Some([0.5, 0.1]), ..checks() };
-        assert!(checks.check(&stretched()).unwrap_err().contains("does not report its payload"));
+        assert!(checks.check(&stretched(), true).unwrap_err().contains("does not report its payload"));
         for (payload, is_right) in [(0.5, true), (0.59, true), (0.61, false), (0.0, false)] {
-            let found = checks.check(&State { payload: Some(payload), ..stretched() });
+            let found = checks.check(&State { payload: Some(payload), ..stretched() }, true);
             assert_eq!(found.is_ok(), is_right, "{found:?}");
         }
     }

@@ -19,7 +19,7 @@ const RETRY: Duration = Duration::from_millis(500);
 impl Live for Robot {
     async fn run(self: Box<Self>, mut link: Link) -> Result<(), DeviceError> {
         let mut listeners = Listeners::open(self.port_numbers).await.map_err(DeviceError)?;
-        let mut phase = Phase::start();
+        let (mut phase, mut is_first) = (Phase::start(), true);
         loop {
             let Some(stream) = idle(&mut link, Stream::open(&self.request)).await else { return Ok(()) };
             let end = match stream {
@@ -28,7 +28,7 @@ impl Live for Robot {
                         // The time until the robot answers is not that of its program.
                         phase = Phase::start();
                     }
-                    let end = self.serve(stream, &mut listeners, phase, &mut link).await?;
+                    let end = self.serve(stream, &mut listeners, (phase, &mut is_first), &mut link).await?;
                     phase = Phase::Refused;
                     end
                 }
@@ -50,12 +50,13 @@ impl Live for Robot {
 }
 
 impl Robot {
-    /// Follows the robot on a connection, until the run or the connection ends.
+    /// Follows the robot on a connection, until the run or the connection ends. `is_first` is whether it has not followed velocities
+    /// in this run.
     async fn serve(
         &self,
         stream: Stream,
         listeners: &mut Listeners,
-        phase: Phase,
+        (phase, is_first): (Phase, &mut bool),
         link: &mut Link,
     ) -> Result<End, DeviceError> {
         let own = stream.own_address().map(|address| address.to_string());
@@ -70,8 +71,9 @@ impl Robot {
             let body = self.script.body(&ports, stream.version).map_err(|why| self.failure(&why))?;
             listeners.serve(Arc::from(body), peer);
         }
-        let mut session = Session::new(self, listeners, stream, (host, peer), phase);
+        let mut session = Session::new(self, listeners, stream, (host, peer), (phase, *is_first));
         let end = session.follow(link).await;
+        *is_first = session.is_first;
         if matches!(end, End::Lost(_)) {
             // Nobody sees what the robot does now, so its program is to end.
             session.abort();

@@ -23,7 +23,7 @@ use std::time::Duration;
 
 use tactflow_runtime::device::{Description, Device, Driver, OnSilence, Opened};
 use tactflow_runtime::node::{At, Describe, FilePath, Mistake, Mistakes, Param};
-use tactflow_runtime::signal::{Joint, JointsShape, Unit};
+use tactflow_runtime::signal::{Joint, JointsShape};
 
 use super::arm::{self, ArmPorts};
 use super::pad;
@@ -114,9 +114,13 @@ pub struct Params {
     /// Maximum difference between the two.
     #[param(unit = "kg", above = 0.0, default = 0.1)]
     tool_mass_bound: f64,
+    /// Posture from which runs begin, with the joints in the order of the model. A run refuses to move an arm that is elsewhere, and the check
+    /// knows where the sensor starts.
+    #[param(unit = "rad")]
+    start: Option<Vec<f64>>,
     /// Bounds of the checks before the first command.
     #[param(default = StartBounds::DEFAULT)]
-    start: StartBounds,
+    start_bounds: StartBounds,
     /// Our address, as the robot sees it; that of our connection to the robot if not given.
     host: Option<String>,
     /// IP address from which the robot connects to us, behind a translation of addresses or from a container; that of our
@@ -158,6 +162,8 @@ enum Start {
 /// in this time it stops the robot at 4 rad/s² and ends, whatever happens to this process, its machine or the cable.
 ///
 /// Before the first velocity, the device compares the posture, the pose of the flange and the payload with the model.
+/// If the bench states `start`, it refuses the first motion of a run as long as a joint is farther than
+/// `start_bounds.posture` from it.
 /// The robot must be running, with normal safety, and its speed slider must not slow it. When this ends, or when the
 /// program ends, the output `safety` is false and the commands ramp to zero. `resume` checks everything again, and
 /// starts the program again.
@@ -200,8 +206,7 @@ impl Device for Ur {
         }
         params.home.as_ref().map_or(Ok(()), |home| arm::check_posture("home", home, chain.joints()))?;
         let timeout_ms = timeout(&params)?;
-        let joint = |joint: &Joint| Joint { acceleration: params.acceleration, start: None, ..joint.clone() };
-        let joints = JointsShape { joints: chain.joints().iter().map(joint).collect(), unit: Unit::RADIAN };
+        let joints = arm::live_joints(&chain, params.acceleration, params.start.as_deref())?;
         let script = params.script.as_ref().map_or_else(|| Ok(Script::own()), Script::vendor)?;
         let mut description = Description::every(1.0 / params.rate_hz);
         let facts = arm::facts(&params.urdf, &params.tip, params.home.as_deref())?;
@@ -210,7 +215,7 @@ impl Device for Ur {
         description.on_silence(OnSilence::Stops, silence(timeout_ms, params.rate_hz, &joints));
         description.needs_commissioning = true;
         let checks = Checks {
-            start: StartCheck::new(to_flange, params.start.clone()),
+            start: StartCheck::new(to_flange, params.start_bounds.clone(), params.start.clone()),
             order,
             base: geometry::base(params.base_yaw),
             tcp_offset: params.tcp_offset,

@@ -61,6 +61,8 @@ pub(super) struct Session<'a> {
     phase: Phase,
     /// Epoch of the commands for which the robot was checked.
     checked: Option<u64>,
+    /// Whether the robot has not followed velocities in this run.
+    pub(super) is_first: bool,
     begin: Instant,
     heard: Instant,
     publishes: bool,
@@ -78,7 +80,7 @@ impl<'a> Session<'a> {
         listeners: &'a Listeners,
         stream: Stream,
         (host, peer): (String, IpAddr),
-        phase: Phase,
+        (phase, is_first): (Phase, bool),
     ) -> Self {
         let now = Instant::now();
         let publishes = !matches!(phase, Phase::Starting { .. });
@@ -95,6 +97,7 @@ impl<'a> Session<'a> {
             sending: None,
             phase,
             checked: None,
+            is_first,
             begin: now,
             heard: now,
             publishes,
@@ -203,7 +206,7 @@ impl<'a> Session<'a> {
             // The checks are those of a still robot.
             return None;
         }
-        if let Err(why) = self.robot.checks.check(state) {
+        if let Err(why) = self.robot.checks.check(state, self.is_first) {
             return Some(why);
         }
         if let Some(why) = self.sending.as_mut().and_then(Sending::failure) {
@@ -211,6 +214,7 @@ impl<'a> Session<'a> {
         }
         if self.reverse.is_some() && is_playing(state) {
             self.phase = Phase::Ready;
+            self.is_first = false;
             self.sending = None;
             return None;
         }
