@@ -154,7 +154,7 @@ fn the_page_leads_from_a_new_bench_to_a_touch() {
                 steps.push("move");
             }
             ["run", ..] => {
-                let run = answered(&mut run(&["--for", "12s"]), "resume\n");
+                let run = answered(&mut run(&["--for", "9s"]), "resume\n");
                 assert_eq!(run.code, 0, "{}{}", run.out, run.err);
                 for part in ["servo ", "pressure [N/tactel]", "limited by", "device `pad`: "] {
                     assert!(run.out.contains(part), "{part}: {}{}", run.out, run.err);
