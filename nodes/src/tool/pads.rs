@@ -19,6 +19,7 @@ Examples:
   tactflow pads
   tactflow pads flexitac         the pads whose name or summary contains `flexitac`
   tactflow describe stream       all keys of a description
+  tactflow describe builtin:pads/flexitac_16x32.toml         a description that ships
 
 Exit codes: 0 success; 2 no pad matches."
 )]

@@ -33,6 +33,8 @@ pub(super) struct PadDriver {
     is_lost: bool,
     /// Number of bytes since the last frame.
     strange: u64,
+    /// Number of frames that were rejected since the last frame.
+    rejected: u64,
 }
 
 /// Why a connection has ended.
@@ -82,7 +84,7 @@ impl PadDriver {
     pub(super) fn new(image: Output<Image>, plan: Plan) -> Self {
         let (reader, cells) = (Reader::new(&plan), vec![0.0; plan.size[0] * plan.size[1]]);
         let received = Vec::with_capacity(RECEIVED_BYTES);
-        Self { image, plan, reader, cells, received, is_lost: false, strange: 0 }
+        Self { image, plan, reader, cells, received, is_lost: false, strange: 0, rejected: 0 }
     }
 
     /// Publishes images until the run or the connection ends.
@@ -151,6 +153,7 @@ impl PadDriver {
         let mut has_image = false;
         while let Some(read) = self.reader.next(&mut self.cells) {
             (has_image, self.strange, self.is_lost) = (true, 0, false);
+            self.rejected = 0;
             let stamp = match read.time {
                 Some(time) => link.stamp_of(time),
                 None => link.arrival(),
@@ -168,6 +171,7 @@ impl PadDriver {
 
     /// Adds to the counts of the run.
     fn count(&mut self, link: &mut Link, foreign: u64) {
+        self.rejected += self.reader.tally.rejected;
         let Tally { frames, rejected, resyncs, skipped, repeated, lost, late } = std::mem::take(&mut self.reader.tally);
         let counts = [
             ("frames", frames),
@@ -191,8 +195,11 @@ impl PadDriver {
     fn silence(&self, since: Duration) -> String {
         let silent = format!("no frame for {} ms", since.as_millis());
         if self.strange == 0 {
-            let asked =
-                if self.plan.start.is_empty() && self.plan.poll.is_none() { "" } else { " and does not answer" };
+            let is_asked = !self.plan.start.is_empty() || self.plan.poll.is_some();
+            let asked = match is_asked {
+                true => " and does not answer: check `baud`, and whether `start` or `poll` must end with a line break",
+                false => ": check `baud`, and whether the pad waits for a `start` or a `poll`",
+            };
             return format!("{silent}: the pad sends nothing{asked}");
         }
         if self.reader.is_ambiguous() {
@@ -201,8 +208,15 @@ impl PadDriver {
                  `plausible` identifies the right one"
             );
         }
+        if self.rejected > 0 && self.plan.has_check {
+            return format!(
+                "{silent}: {} bytes came with {} frames that have no right checksum; check `check`, `check_from` and \
+                 `check_order`, and that `length` and `mark` are right",
+                self.strange, self.rejected
+            );
+        }
         format!(
-            "{silent}: {} bytes came, and none of them is a frame; check `baud`, `frame`, `mark` and `length`",
+            "{silent}: {} bytes came, and none of them is a frame; check `baud`, `frame`, `mark`, `length` and `offset`",
             self.strange
         )
     }

@@ -42,6 +42,7 @@ const MISTAKES: &[(&str, &str, &str)] = &[
     ("length = 8\ncheck = 'sum16le'", "length", "the last value ends after 8 bytes, and 2 more follow it, but"),
     ("length = 100_000", "length", "a frame has at most 65536 bytes"),
     ("frame = 'trailer'\nlength = 7", "length", "the last value ends after 6 bytes, and 2 more follow it, but"),
+    ("frame = 'reply'\npoll = '01 04 F1'", "poll", "`01 04 F1` is sent as text, and looks like hexadecimal digits"),
     ("check = 'crc-16/modbuss'", "check", "no checksum is called `crc-16/modbuss`"),
     ("check_from = 2", "check_from", "`check_from` has no meaning without a `check`"),
     ("check = 'xor8'\ncheck_from = 8", "check_from", "the checksum covers nothing: it stands at byte 8"),

@@ -59,7 +59,7 @@ pub(super) struct DoctorArgs {
     /// Bench file
     bench: PathBuf,
     /// How long to watch the devices: 3s, 500ms, 1min
-    #[arg(long = "for", value_name = "TIME", value_parser = duration, default_value = "3s")]
+    #[arg(long = "for", value_name = "TIME", value_parser = duration, default_value = "5s")]
     duration: f64,
     /// After a typed `yes`, move each real arm by some millimetres at 5 mm/s, send nothing more, and measure how it stops
     #[arg(long = "move")]
@@ -153,6 +153,8 @@ pub(super) fn run(args: DoctorArgs, shell: &Shell) -> u8 {
     }
     if args.moves && worst != Severity::Problem {
         worst = worst.max(prove(shell, &args.bench, &arms, &bind));
+    } else if args.moves {
+        shell.say("not moved, because of the problems above");
     }
     if worst == Severity::Problem { FAULTED } else { 0 }
 }

@@ -7,6 +7,8 @@ use super::timing::quantile;
 
 /// Standard deviations of the noisiest tactel above its mean at which a threshold leaves it quiet.
 const THRESHOLD_DEVIATIONS: f64 = 5.0;
+/// Ratio of the noise of the noisiest tactel to that of the median one from which on the pad is not free.
+const TOUCHED_DEVIATIONS: f64 = 20.0;
 /// Number of frames from which on the noise is known.
 const MIN_FRAMES: u64 = 20;
 /// Maximum number of tactels that a line names.
@@ -79,6 +81,10 @@ impl Noise {
             self.place(deviations.iter().position(|noise| *noise == most).unwrap_or(0)),
         );
         let mut findings = vec![Finding::fine(text)];
+        if median > 0.0 && most > TOUCHED_DEVIATIONS * median {
+            let text = "something seems to touch the pad, or a tactel is noisy: free the pad and run this again";
+            findings.push(Finding::warning(text));
+        }
         let still: Vec<usize> = (0..deviations.len()).filter(|i| deviations[*i] == 0.0).collect();
         let is_quiet_pad = median == 0.0;
         if !still.is_empty() && !is_quiet_pad {

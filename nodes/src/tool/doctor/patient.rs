@@ -102,7 +102,10 @@ impl Patient {
         }
         for port in &self.ports {
             let name = port.label();
-            findings.extend(port.lost.iter().map(|why| Finding::problem(format!("{name} was lost: {why}"))));
+            // The ports of a device are usually lost together.
+            let is_known = |why: &str| findings.iter().any(|finding| finding.text.ends_with(why));
+            let news = port.lost.as_ref().filter(|why| !is_known(why));
+            findings.extend(news.map(|why| Finding::problem(format!("{name} was lost: {why}"))));
             // Another posture of the same joints has the same names and ranges.
             if port.kind != Kind::Joints || self.is_first(port, |other| other.kind == port.kind) {
                 findings.extend(port.content.describe(&name));
@@ -119,7 +122,8 @@ impl Patient {
 
     /// Says whether an arm would move.
     fn readiness(&self) -> Option<Finding> {
-        if let Some(why) = self.attached.refusal() {
+        let is_lost = self.ports.iter().any(|port| port.lost.is_some());
+        if let Some(why) = self.attached.refusal().filter(|_| !is_lost) {
             return Some(Finding::problem(format!("it would not move: {why}")));
         }
         let waits = |port: &Port| port.name == "safety" && matches!(port.content, Content::Flag(_, Some(false)));

@@ -10,6 +10,8 @@ const RATE_TOLERANCE: f64 = 0.1;
 pub(super) struct Timing {
     /// Time of the first arrival since the start [s].
     first: Option<f64>,
+    /// Stamp of the first sample [s].
+    first_stamp: f64,
     /// Stamp of the last sample [s], and how many were written until then.
     last: Option<(f64, u64)>,
     /// Number of samples after the first one.
@@ -23,7 +25,9 @@ pub(super) struct Timing {
 impl Timing {
     /// Adds the newest sample of a port that was written `writes` times; `stamp` and `now` are in s since the start.
     pub(super) fn add(&mut self, stamp: f64, writes: u64, now: f64) {
-        self.first.get_or_insert(now);
+        if self.first.is_none() {
+            (self.first, self.first_stamp) = (Some(now), stamp);
+        }
         self.ages.push(now - stamp);
         if let Some((last, before)) = self.last.replace((stamp, writes)) {
             let samples = writes - before;
@@ -52,7 +56,8 @@ impl Timing {
         let deviation = (spread / self.intervals.len() as f64).sqrt();
         let [low, high] = [quantile(&self.intervals, 0.0), quantile(&self.intervals, 1.0)];
         let [young, old] = [quantile(&self.ages, 0.5), quantile(&self.ages, 0.99)];
-        let (rate, declared) = (1.0 / mean, 1.0 / period);
+        let last = self.last.map_or(self.first_stamp, |(stamp, _)| stamp);
+        let (rate, declared) = (self.count as f64 / (last - self.first_stamp), 1.0 / period);
         let text = format!(
             "{port}: {} samples, the first after {:.0} ms; {rate:.1} Hz (declared {declared:.1} Hz), intervals {:.2} to \
              {:.2} ms, deviation {:.2} ms; age on arrival {:.2} ms at the median, {:.2} ms for 99 %",
@@ -67,9 +72,7 @@ impl Timing {
         let mut findings = vec![Finding::fine(text)];
         let is_off = (rate / declared - 1.0).abs() > RATE_TOLERANCE;
         if is_off {
-            findings.push(Finding::warning(format!(
-                "the rate is not the declared one: correct it in the bench, to {rate:.0} Hz"
-            )));
+            findings.push(Finding::warning(format!("the rate is not the declared one: correct it, to {rate:.0} Hz")));
         }
         findings
     }
@@ -109,10 +112,7 @@ mod tests {
     #[test]
     fn another_rate_and_silence_are_found() {
         let findings = timing(0.02, 50).describe("image", 0.01, 1.0);
-        assert_eq!(
-            findings[1],
-            Finding::warning("the rate is not the declared one: correct it in the bench, to 50 Hz")
-        );
+        assert_eq!(findings[1], Finding::warning("the rate is not the declared one: correct it, to 50 Hz"));
         assert_eq!(Timing::default().describe("image", 0.01, 3.0)[0].severity, Severity::Problem);
         assert_eq!(timing(0.01, 1).describe("image", 0.01, 3.0)[0].severity, Severity::Problem);
     }

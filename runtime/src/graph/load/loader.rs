@@ -51,6 +51,9 @@ impl Loader {
                     "name a task, and this file as its bench: `TASK.toml --bench {}`",
                     request.graph.display()
                 )),
+                "a sensor" | "a robot" => {
+                    Some("name it in a bench, and check a task with that: `TASK.toml --bench BENCH.toml`".to_owned())
+                }
                 _ => None,
             };
             self.diagnostics.push(Diagnostic::new(Code::WrongFile, root.1, message).with_help(help));

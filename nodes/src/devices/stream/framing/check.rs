@@ -64,6 +64,17 @@ catalogue! {
 /// The checksums that are no CRC.
 const SIMPLE: [&str; 5] = ["none", "xor8", "sum8", "sum16le", "sum16be"];
 
+/// Other names of CRCs that data sheets use, each with that of the catalogue.
+const ALIASES: [(&str, &str); 7] = [
+    ("crc-8", "crc-8/smbus"),
+    ("crc-16", "crc-16/arc"),
+    ("crc-16/x-25", "crc-16/ibm-sdlc"),
+    ("crc-16/ccitt-false", "crc-16/ibm-3740"),
+    ("crc-32", "crc-32/iso-hdlc"),
+    ("crc-32c", "crc-32/iscsi"),
+    ("modbus", "crc-16/modbus"),
+];
+
 /// Returns the name of a CRC as the catalogue writes it: `crc-16/modbus` for `CRC_16_MODBUS`.
 fn written(constant: &str) -> String {
     let lower = constant.to_lowercase();
@@ -106,6 +117,8 @@ impl Sum {
 
     /// Returns a CRC. One that takes the low bit first is sent with the low byte first.
     fn crc(name: &str) -> Option<(Self, ByteOrder)> {
+        let lower = name.to_lowercase();
+        let name = ALIASES.iter().find(|(alias, _)| *alias == lower).map_or(name, |(_, name)| name);
         let constant = name.to_uppercase().replace(['-', '/', ' '], "_");
         let (_, parameters) = CRCS.iter().find(|(known, _)| *known == constant)?;
         let order = |is_reflected: bool| if is_reflected { ByteOrder::Le } else { ByteOrder::Be };
@@ -181,6 +194,10 @@ mod tests {
             ("crc-16/modbus", 0x4B37),
             ("CRC-16/XMODEM", 0x31C3),
             ("crc-32/iso-hdlc", 0xCBF4_3926),
+            ("CRC-32", 0xCBF4_3926),
+            ("crc-16/x-25", 0x906E),
+            ("crc-16/ccitt-false", 0x29B1),
+            ("crc-32c", 0xE306_9283),
         ];
         for (name, expected) in published {
             assert_eq!(check(name, 0, 0).sum.of_bytes(DIGITS), expected, "{name}");

@@ -42,6 +42,8 @@ pub(crate) struct Plan {
     pub(crate) stamps: Option<Stamps>,
     pub(crate) counter: Option<Counter>,
     pub(crate) repeats_are_new: bool,
+    /// Whether a frame has a checksum.
+    pub(crate) has_check: bool,
     /// Rows and columns of the image.
     pub(crate) size: [usize; 2],
 }
@@ -101,6 +103,7 @@ impl Plan {
             stamps: stamp,
             counter: params.clock.counter.map(Counter::new),
             repeats_are_new: params.repeats_are_new,
+            has_check: params.check != "none",
             size: [rows, cols],
         })
     }

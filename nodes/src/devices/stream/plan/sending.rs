@@ -6,7 +6,7 @@ use tactflow_runtime::node::{At, Mistake, Mistakes};
 use tactflow_runtime::source::Code;
 
 use super::params::{Framing, Params};
-use super::text::bytes_of;
+use super::text::{bytes_of, is_spaced_hex};
 use super::useless;
 use crate::devices::link::Address;
 use crate::devices::link::address::FORMS;
@@ -58,6 +58,12 @@ pub(crate) fn sent(params: &Params, address: Option<&Address>, mistakes: &mut Mi
         None => Some(None),
         Some(Ok(bytes)) if bytes.is_empty() => {
             mistakes.push(Mistake::param(key, format!("`{key}` is empty")).help("leave it out to send nothing"));
+            None
+        }
+        Some(Ok(_)) if text.as_deref().is_some_and(is_spaced_hex) => {
+            let text = text.as_deref().unwrap_or_default();
+            let mistake = Mistake::param(key, format!("`{text}` is sent as text, and looks like hexadecimal digits"));
+            mistakes.push(mistake.instead(text, &format!("hex:{text}")));
             None
         }
         Some(Ok(bytes)) => Some(Some(bytes)),

@@ -25,6 +25,12 @@ pub(crate) fn is_bare_hex(text: &str) -> bool {
     text.len().is_multiple_of(2) && text.len() >= 2 && text.chars().all(|digit| digit.is_ascii_hexdigit())
 }
 
+/// Whether a text is bytes in hexadecimal digits with spaces between them: `01 04 00`.
+pub(crate) fn is_spaced_hex(text: &str) -> bool {
+    let is_byte = |word: &str| word.len() == 2 && word.chars().all(|digit| digit.is_ascii_hexdigit());
+    text.contains(' ') && text.split(' ').all(is_byte)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -36,6 +42,7 @@ mod tests {
         assert_eq!(bytes_of("A\n"), Ok(b"A\n".to_vec()));
         assert_eq!(bytes_of("hex:AA5").unwrap_err().0, "3 hexadecimal digits are not whole bytes");
         assert_eq!(bytes_of("hex:0xAA").unwrap_err().0, "`x` is not a hexadecimal digit");
+        assert!(is_spaced_hex("01 04 F1") && !is_spaced_hex("01") && !is_spaced_hex("go 01"));
         assert!(is_bare_hex("AA55") && !is_bare_hex("wr") && !is_bare_hex("AA5"));
     }
 }
