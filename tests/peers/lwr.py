@@ -6,8 +6,9 @@ the quality falls, and below ok the session drops to monitor and the arm stops. 
 It checks every answer, and prints what it saw as lines of JSON: `state` and `do` when they happen, `cycle` for each
 measurement with `--cycles`, and `end` with all counts.
 
-With `--guided`, a person guides the arm by hand: each line `move q1 … q7` [rad] on the standard input puts it there at
-once, and is answered with the event `moved`. The controller ends with the standard input.
+With `--guided`, a person guides the arm by hand. Each line on the standard input is `move q1 … q7` [rad], which puts it
+there at once, `drift V`, which turns the first joint at V rad/s, or `quiet`, which ends the measurements. Each is
+answered with the event `told`. The controller ends with the standard input.
 
     python3 lwr.py --port 49938 --seconds 5 --events '[{"at": 1.0, "do": "lose", "count": 5}]'
 """
@@ -82,6 +83,7 @@ class Controller:
         self.lost, self.held, self.swallowed, self.ints = 0, [], 0, [0] * 16
         self.last, self.entered, self.fresh = None, False, None
         self.frozen, self.kept, self.orders, self.is_left = False, [], b"", False
+        self.drift, self.is_quiet = 0.0, False
         self.counts = {
             "sent": 0, "answers": 0, "bad_answers": 0, "mirror_errors": 0, "flag_errors": 0, "sequence_errors": 0,
             "unknown_answers": 0, "stranger_answers": 0, "old_answers": 0, "drops": 0, "commands": 0,
@@ -219,12 +221,21 @@ class Controller:
             data = os.read(0, 4096)
             self.args.guided, self.is_left = data != b"", data == b""
             *lines, self.orders = (self.orders + data).split(b"\n")
-            for line in lines:
-                word, *numbers = line.split()
-                assert word == b"move" and len(numbers) == 7, line
-                self.total = [f32(float(number)) for number in numbers]
+            for word, *numbers in (line.decode().split() for line in lines):
+                numbers = [float(number) for number in numbers]
+                if word == "move":
+                    assert len(numbers) == 7, numbers
+                    self.total, self.drift = [f32(number) for number in numbers], 0.0
+                elif word == "drift":
+                    (self.drift,) = numbers
+                else:
+                    assert word == "quiet", word
+                    self.is_quiet = True
                 self.measured = [q + self.args.sag for q in self.total]
-                self.say("moved")
+                self.say("told", what=word)
+        if self.drift:
+            self.total = [self.total[0] + self.drift * self.dt, *self.total[1:]]
+            self.measured = [q + self.args.sag for q in self.total]
 
     def enter(self, state):
         if state == self.state:
@@ -329,7 +340,7 @@ class Controller:
             self.sequence = (self.sequence + 1) % 65536
             event = self.due()
             bytes_ = self.datagram(self.sequence)
-            if event is None or self.act(event, bytes_):
+            if not self.is_quiet and (event is None or self.act(event, bytes_)):
                 self.usual(bytes_)
             if self.args.cycles:
                 told = [round(q, 9) for q in self.total]

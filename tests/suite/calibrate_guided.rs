@@ -91,7 +91,7 @@ impl Arm {
     fn goes_to(&mut self, joints: &[f64; 7]) {
         let list: Vec<String> = joints.iter().map(f64::to_string).collect();
         self.0.write(&format!("move {}", list.join(" ")));
-        self.0.hears(&["\"moved\""]);
+        self.0.hears(&["\"told\""]);
     }
 
     /// Ends the controller. It must have got no answer: nothing was sent to the arm.

@@ -78,6 +78,8 @@ mod task_crossings;
 mod task_drivers;
 mod task_folder;
 mod tasks;
+#[cfg(target_os = "linux")]
+mod teach;
 mod tick;
 mod tidy;
 mod together;

@@ -12,6 +12,7 @@ mod pose;
 mod press;
 #[cfg(feature = "drivers")]
 mod sniff;
+mod teach;
 
 use tactflow_runtime::catalogue::Catalogue;
 use tactflow_runtime::cli::{Tool, derived};
@@ -25,7 +26,8 @@ pub fn tool(catalogue: Catalogue) -> Tool {
         .command(derived(doctor::run))
         .command(derived(new::run))
         .command(derived(pose::run))
-        .command(derived(press::run));
+        .command(derived(press::run))
+        .command(derived(teach::run));
     #[cfg(feature = "drivers")]
     let tool = tool.command(derived(pads::run)).command(derived(sniff::run));
     tool

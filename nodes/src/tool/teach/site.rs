@@ -1,0 +1,129 @@
+//! What is taught: an arm of a bench, the point on it that touches, and what the bench states already.
+
+use std::path::Path;
+
+use nalgebra::{IsometryMatrix3, Vector3};
+use tactflow_runtime::graph::{OpenBench, open_bench};
+use tactflow_runtime::signal::{Joints, Shape};
+
+use super::super::guided::{BoundRole, GuidedArm, GuidedCell};
+use crate::motion::pose::pose_of;
+
+/// An arm of a bench, and the point on it that touches.
+pub(super) struct Site {
+    pub(super) arm: GuidedArm,
+    /// Pose of the touching point in the frame of the tip.
+    mount: IsometryMatrix3<f64>,
+    /// The touching point in words.
+    pub(super) point: String,
+    /// Section of the limits of this arm: `limits`, and the role if the bench binds several arms.
+    pub(super) limits: Vec<String>,
+    /// Postures that the bench states [rad].
+    pub(super) home: Option<Vec<f64>>,
+    pub(super) start: Option<Vec<f64>>,
+    /// Rows of `keep_out` that the bench states for this arm.
+    pub(super) rows: Vec<[f64; 4]>,
+}
+
+/// A pad that a bench binds: its role, and the origin and the angles of its mount [m, rad].
+type Pad = (String, [[f64; 3]; 2]);
+
+impl Site {
+    /// Finds the arm and the pad.
+    ///
+    /// # Errors
+    /// If the bench has no such arm or pad, or several and none is named, or if the arm cannot be taught.
+    pub(super) fn find(
+        cell: &GuidedCell<'_>,
+        path: &Path,
+        arm: Option<&str>,
+        sensor: Option<&str>,
+    ) -> Result<Self, String> {
+        let found = GuidedArm::find(cell, arm)?;
+        let description = cell.device(found.position).description();
+        let BoundRole { role, device, side } = &found.bound;
+        if side.is_some() {
+            return Err(format!(
+                "device `{device}` has several sides, and their postures cannot be written by `teach`: write them by hand"
+            ));
+        }
+        let home = description.fact_on(None, "velocity_arm", "home").and_then(numbers);
+        let start = match description.shape("position") {
+            Some(Shape::Joints(shape)) => shape.joints.iter().map(|joint| joint.start).collect(),
+            _ => None,
+        };
+        let arms = cell.bound().iter().filter(|bound| cell.port::<Joints>(bound, "position").is_some()).count();
+        let mut limits = vec!["limits".to_owned()];
+        limits.extend((arms > 1).then(|| role.clone()));
+        let (mount, point) = match pad(pads(cell, path)?, sensor)? {
+            Some((pad, [xyz, rpy])) => {
+                (pose_of(xyz, rpy), format!("the origin of `{pad}`, which is at {xyz:?} m on the tip of `{role}`"))
+            }
+            None => (IsometryMatrix3::identity(), format!("the tip of `{role}`")),
+        };
+        let rows = rows(path, &limits)?;
+        Ok(Self { arm: found, mount, point, limits, home, start, rows })
+    }
+
+    /// Returns the touching point of a pose of the tip [m].
+    pub(super) fn point_of(&self, tip: &IsometryMatrix3<f64>) -> Vector3<f64> {
+        (tip * self.mount).translation.vector
+    }
+
+    /// Returns the touching point in a posture [m].
+    pub(super) fn point_at(&self, joints: &[f64]) -> Vector3<f64> {
+        self.point_of(&self.arm.tip(joints))
+    }
+}
+
+fn numbers(value: &toml::Value) -> Option<Vec<f64>> {
+    let number = |value: &toml::Value| value.as_float().or_else(|| value.as_integer().map(|number| number as f64));
+    value.as_array()?.iter().map(number).collect()
+}
+
+/// Returns the pads of a bench. A pad may be simulated, so the devices are opened once more, without a connection.
+fn pads(cell: &GuidedCell<'_>, path: &Path) -> Result<Vec<Pad>, String> {
+    let bench = open_bench(cell.shell().catalogue(), path);
+    let OpenBench { devices, .. } = bench.map_err(|report| report.render(false))?;
+    let pad = |bound: &BoundRole| {
+        let device = devices.iter().find(|device| device.name == bound.device)?;
+        let mount = device.opened.description.fact_on(bound.side.as_deref(), "tactile_pad", "mount")?;
+        let part = |name: &str| mount.get(name).and_then(numbers)?.try_into().ok();
+        Some((bound.role.clone(), [part("xyz")?, part("rpy")?]))
+    };
+    Ok(cell.bound().iter().filter_map(pad).collect())
+}
+
+/// Returns the pad of the role `wanted`, or the only one; `None` without a pad.
+fn pad(pads: Vec<Pad>, wanted: Option<&str>) -> Result<Option<Pad>, String> {
+    let names = || pads.iter().map(|(role, _)| format!("`{role}`")).collect::<Vec<_>>().join(", ");
+    match wanted {
+        Some("none") => Ok(None),
+        Some(wanted) => {
+            let message = match pads.is_empty() {
+                true => format!("the bench binds no pad `{wanted}`: leave out `--sensor` to touch with the tip"),
+                false => format!("the bench binds no pad `{wanted}`: write `--sensor` with one of {}", names()),
+            };
+            pads.into_iter().find(|(role, _)| role == wanted).map(Some).ok_or(message)
+        }
+        None if pads.len() > 1 => Err(format!(
+            "the bench binds several pads: name the one that touches with `--sensor`, one of {}, or `none` for the tip",
+            names()
+        )),
+        None => Ok(pads.into_iter().next()),
+    }
+}
+
+/// Returns the rows of `keep_out` in a section of a bench file.
+fn rows(path: &Path, section: &[String]) -> Result<Vec<[f64; 4]>, String> {
+    let fail = |error: &dyn std::fmt::Display| format!("cannot read `{}`: {error}", path.display());
+    let text = std::fs::read_to_string(path).map_err(|error| fail(&error))?;
+    let root: toml::Value = toml::from_str(&text).map_err(|error| fail(&error))?;
+    let found = section.iter().try_fold(&root, |value, name| value.get(name)).and_then(|limits| limits.get("keep_out"));
+    let Some(rows) = found.and_then(toml::Value::as_array) else { return Ok(Vec::new()) };
+    let read = |row: &toml::Value| {
+        let message = "a row of `keep_out` is not four plain numbers, so it cannot be kept: write it without units";
+        numbers(row).and_then(|row| row.try_into().ok()).ok_or_else(|| message.to_owned())
+    };
+    rows.iter().map(read).collect()
+}
