@@ -273,7 +273,7 @@ fn an_arm_that_is_not_as_its_model_says_never_moves() {
 fn a_run_begins_at_its_start_and_goes_on_anywhere_after_a_stop() {
     // The second joint is 0.08 rad from the start, and the first one is farther away when the session drops.
     let start = "start = [0.0, 0.58, 0.0, -1.3, 0.0, 1.3, 0.0]";
-    let (mut rig, mut krc) =
+    let (mut rig, krc) =
         pair(start, "--seconds 20 --restart-s 0.2 --until-silent", r#"[{"at": 1.2, "do": "monitor"}]"#);
     let first = |rig: &LinkRig| rig.get::<Joints>("position").map_or(0.0, |joints| joints.0[0]);
     assert!(drive(&mut rig, SPEED, true, |rig| first(rig) > 0.12 && krc.has_said(|said| said["what"] == "monitor")));
