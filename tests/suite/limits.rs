@@ -79,6 +79,10 @@ fn without_any_one_limiter_no_shipped_graph_loads() {
         fs::write(&path, part.to_string()).unwrap();
         for graph in shipped_graphs() {
             let graph = graph.file_name().unwrap().to_str().unwrap();
+            // It has no arm.
+            if graph == "look.toml" {
+                continue;
+            }
             let report = refused(&folder, graph).unwrap_or_else(|| panic!("{graph} loads without `{name}`"));
             let codes: Vec<Code> = report.diagnostics.iter().map(|d| d.code).collect();
             assert!(codes.contains(&Code::UnlimitedCommand), "{graph} without `{name}`: {}", report.render(false));

@@ -185,7 +185,7 @@ fn settings_that_cannot_be_are_told_at_their_place() {
         ("object={ shape = 'plane', mass = 0.1 }", "expected one of `box`, `ball`"),
         ("object.mass=0.0002", "and at most 64 are simulated"),
         ("left.inertia=[1.0]", "left arm: `inertia` has 1 entries, but the arm has 6 joints"),
-        ("right.home=[0.0]", "right arm: `start` has 1 entries, but the arm has 6 joints"),
+        ("right.home=[0.0]", "right arm: `home` has 1 entries, but the arm has 6 joints"),
         ("right.tip='nothing'", "right arm: the model has no link `nothing`"),
         ("right.stiffness=1e6", "right arm: a joint of 0.1 kg m² moves too fast"),
         ("step_s=0.01", "the step must be from 1e-6 to 0.002 s"),

@@ -108,7 +108,8 @@ fn a_second_signal_does_not_cut_the_ramp() {
     assert_eq!(said.code, 0, "{}", said.err);
     assert!(took < SOON, "{took:?}");
     assert_eq!(number(&seen, "last_dq"), 0.0, "{seen}");
-    assert!(number(&seen, "step") <= 2.0 * 0.05 * 0.004 + 1e-9, "within the acceleration: {seen}");
+    // In real time, a tick may be late by a period and more; a cut would be a step of 0.01 rad/s.
+    assert!(number(&seen, "step") <= 4.0 * 0.05 * 0.004, "within the acceleration: {seen}");
 }
 
 #[test]

@@ -51,7 +51,7 @@ pub(crate) struct StartReport<'r> {
     pub(crate) held: Option<&'r [f64]>,
     /// The pose of the tip in the base that the robot reports for the measured posture, if it does [m].
     pub(crate) tip: Option<IsometryMatrix3<f64>>,
-    /// Whether the arm has not followed commands in this run.
+    /// Whether no command has moved the arm in this run.
     pub(crate) is_first: bool,
 }
 

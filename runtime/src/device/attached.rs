@@ -27,11 +27,31 @@ impl Attached {
     /// # Errors
     /// If the operating system gives no thread.
     pub fn start(name: &str, description: Description, driver: Box<dyn Live>) -> io::Result<Self> {
+        Self::begin(name, description, driver, false)
+    }
+
+    /// Starts the driver of a device that is only listened to: it never sends anything to the device.
+    ///
+    /// # Errors
+    /// If the operating system gives no thread.
+    pub fn listen(name: &str, description: Description, driver: Box<dyn Live>) -> io::Result<Self> {
+        let mut attached = Self::begin(name, description, driver, true)?;
+        attached.rest();
+        Ok(attached)
+    }
+
+    fn begin(name: &str, description: Description, driver: Box<dyn Live>, is_mute: bool) -> io::Result<Self> {
         let (samples, commands) = (Samples::of(&description), Commands::of(&description));
         let epoch = Instant::now();
         let accelerations = commands.values.iter().map(|values| vec![f64::INFINITY; values.len()]).collect();
-        let setup =
-            LinkSetup { description: &description, samples: &samples, commands: &commands, accelerations, epoch };
+        let setup = LinkSetup {
+            description: &description,
+            samples: &samples,
+            commands: &commands,
+            accelerations,
+            epoch,
+            is_mute,
+        };
         let linked = start(name, driver, setup)?;
         Ok(Self { description, linked, samples, commands, epoch })
     }

@@ -228,6 +228,8 @@ pub(crate) struct LinkSetup<'a> {
     pub(crate) accelerations: Vec<Vec<f64>>,
     /// Time zero of the graph's clock.
     pub(crate) epoch: Instant,
+    /// Whether the driver must not send anything, from the beginning.
+    pub(crate) is_mute: bool,
 }
 
 /// Starts a driver on a thread of its own, and returns the graph's end of the link to it. The calling thread is woken
@@ -236,7 +238,7 @@ pub(crate) struct LinkSetup<'a> {
 /// # Errors
 /// If the operating system gives no thread.
 pub(crate) fn start(name: &str, driver: Box<dyn Live>, setup: LinkSetup<'_>) -> io::Result<Linked> {
-    let LinkSetup { description, samples, commands, accelerations, epoch } = setup;
+    let LinkSetup { description, samples, commands, accelerations, epoch, is_mute } = setup;
     let (samples_in, samples_out) = TripleBuffer::new(samples).split();
     let (commands_in, commands_out) = TripleBuffer::new(commands).split();
     let (stop, stopping) = watch::channel(String::new());
@@ -247,7 +249,7 @@ pub(crate) fn start(name: &str, driver: Box<dyn Live>, setup: LinkSetup<'_>) -> 
     let lease = Lease::new(commands.clone(), accelerations, cycle.as_nanos() as i64, silence.as_nanos() as i64);
     let shared = lease.shared();
     let (published, commanded) = (Arc::new(AtomicU64::new(0)), Arc::new(Notify::new()));
-    let [finished, mute] = [(); 2].map(|()| Arc::new(AtomicBool::new(false)));
+    let [finished, mute] = [false, is_mute].map(|is_so| Arc::new(AtomicBool::new(is_so)));
     let link = Link {
         staging: samples.clone(),
         samples: samples_in,

@@ -64,8 +64,10 @@ pub(super) struct Fri {
     /// The values for the KRL program.
     krl: Option<Krl>,
     phase: Phase,
-    /// Whether the arm has moved by commands in this run.
+    /// Whether the arm has followed commands in this run, if only those of rest.
     has_followed: bool,
+    /// Whether a command has moved the arm in this run.
+    has_moved: bool,
     /// When the controller sent its first measurement.
     first: Option<Instant>,
     /// Time between two measurements: the longer one of those that the bench and the controller state [s].
@@ -155,6 +157,7 @@ impl Fri {
             krl: None,
             phase: Phase::Mirrored,
             has_followed: false,
+            has_moved: false,
             first: None,
             sample_time,
             sets_impedance: false,
@@ -372,7 +375,11 @@ impl Fri {
         let velocity: Joints = std::array::from_fn(|i| held[i]);
         // The operator may have resumed since `advance`. Then these commands are new, and nothing is checked yet.
         let is_checked = self.phase == Phase::Checked && self.checked == Some(link.epoch());
-        if is_checked && !self.is_unsent && self.target.step(&velocity, sample_time(report), now) {
+        if !is_checked || self.is_unsent {
+            return;
+        }
+        self.has_moved |= velocity.iter().any(|v| *v != 0.0);
+        if self.target.step(&velocity, sample_time(report), now) {
             link.count("shortened steps");
         }
     }
@@ -406,7 +413,7 @@ impl Fri {
             target: self.target.position(),
             held: self.held.as_ref().map(|held| &held[..]),
             tip: Some(report.pose),
-            is_first: !self.has_followed,
+            is_first: !self.has_moved,
         };
         self.check.check(&start).err().map(|error| error.0)
     }

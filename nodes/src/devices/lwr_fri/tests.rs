@@ -53,7 +53,7 @@ fn bad_settings() {
         ("start = [0, 0]", "`start` has 2 entries, but the arm has 7 joints"),
         (
             "start = [0, 3, 0, 0, 0, 0, 0]",
-            "joint `lwr_a2_joint` cannot start at 3: its range is -2.0944 to 2.0944 (rad, or m if prismatic)",
+            "`start` puts joint `lwr_a2_joint` at 3, outside of its range from -2.0944 to 2.0944 (rad, or m if prismatic)",
         ),
         ("krl_ints = { 17 = 1 }", "`17` is no number of an integer of KRL: they are 1 to 16"),
         ("krl_ints = { x = 1 }", "`x` is no number of an integer of KRL: they are 1 to 16"),

@@ -66,7 +66,7 @@ impl Robot {
         let Ok(peer) = self.peer.map_or_else(|| stream.peer_address(), Ok) else {
             return Ok(End::Lost("the connection is closed".into()));
         };
-        if !self.sends_program {
+        if !self.sends_program && !link.is_mute() {
             let ports = self.script_ports(&host, listeners);
             let body = self.script.body(&ports, stream.version).map_err(|why| self.failure(&why))?;
             listeners.serve(Arc::from(body), peer);

@@ -61,7 +61,7 @@ pub(super) struct Session<'a> {
     phase: Phase,
     /// Epoch of the commands for which the robot was checked.
     checked: Option<u64>,
-    /// Whether the robot has not followed velocities in this run.
+    /// Whether no velocity has moved the robot in this run.
     pub(super) is_first: bool,
     begin: Instant,
     heard: Instant,
@@ -214,7 +214,6 @@ impl<'a> Session<'a> {
         }
         if self.reverse.is_some() && is_playing(state) {
             self.phase = Phase::Ready;
-            self.is_first = false;
             self.sending = None;
             return None;
         }
@@ -297,7 +296,10 @@ impl<'a> Session<'a> {
         let course = Course::of(self.phase, is_checked, is_refused);
         let velocity = course.next(&self.sent, &held, self.robot.acceleration, dt);
         match reverse.send(&message::velocity(self.robot.timeout_ms, &velocity)) {
-            Ok(true) => self.sent = velocity,
+            Ok(true) => {
+                self.sent = velocity;
+                self.is_first &= velocity == [0.0; JOINTS];
+            }
             Ok(false) => link.count("messages that the robot did not take"),
             Err(_) => self.disconnect(),
         }
@@ -305,6 +307,10 @@ impl<'a> Session<'a> {
 
     fn accept(&mut self, link: &mut Link, accepted: std::io::Result<(TcpStream, SocketAddr)>) {
         let Ok((stream, from)) = accepted else { return };
+        // Somebody has pressed play. Without a connection, the program ends.
+        if link.is_mute() {
+            return;
+        }
         // With the maker's or our own program that we send, a connection is expected only then.
         let is_expected = match self.phase {
             Phase::Starting { has_sent, .. } => has_sent || !self.robot.sends_program,

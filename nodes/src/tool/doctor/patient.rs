@@ -49,10 +49,7 @@ impl Patient {
         description: Description,
         driver: Box<dyn Live>,
     ) -> io::Result<Self> {
-        let mut attached = Attached::start(name, description, driver)?;
-        // An arm is only listened to.
-        attached.mute(true);
-        attached.rest();
+        let attached = Attached::listen(name, description, driver)?;
         let description = attached.description();
         let outputs = description.outputs().zip(description.output_sides());
         let ports = outputs.map(|((name, shape), side)| Port {

@@ -107,10 +107,8 @@ impl<'s> GuidedCell<'s> {
                 stepped.push(name);
                 continue;
             };
-            let mut attached = Attached::start(&name, opened.description, driver)
+            let attached = Attached::listen(&name, opened.description, driver)
                 .map_err(|error| shell.refuse(format_args!("cannot start device `{name}`: {error}")))?;
-            attached.mute(true);
-            attached.rest();
             started.push((name, attached));
         }
         let bound = bind.into_iter().map(|(role, word)| bound_role(role, &word)).collect();

@@ -24,6 +24,7 @@ impl Engine {
                 commands: &device.commands,
                 accelerations: accelerations(&device.commands.values, slots),
                 epoch,
+                is_mute: false,
             };
             device.link = DeviceLink::Live(start(&device.name, driver, setup)?);
         }

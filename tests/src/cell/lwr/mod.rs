@@ -403,7 +403,10 @@ mod tests {
         let float = |at: usize| f32::from_le_bytes([msr[at], msr[at + 1], msr[at + 2], msr[at + 3]]);
         assert_eq!([140, 148, 216, 292, 320].map(float), [1.5, 0.004, 0.49, 0.5, 0.0]);
         // Three rows of four: the last of each is the position.
-        assert_eq!([244, 256, 272, 288].map(float), [1.0, 0.1, 0.2, 0.3]);
+        let pose = flange(&[0.49; JOINTS]);
+        let at = pose.translation.vector;
+        let expected = [pose.rotation[(0, 0)], at.x, at.y, at.z].map(|value| value as f32);
+        assert_eq!([244, 256, 272, 288].map(float), expected);
         assert_eq!(state(&msr), [1, 0]);
     }
 

@@ -26,7 +26,11 @@ struct Rig {
 impl Rig {
     /// A driver that was checked once and may move.
     fn ready() -> Self {
-        let (description, fri) = opened(read(ARM)).unwrap();
+        Self::of(ARM)
+    }
+
+    fn of(params: &str) -> Self {
+        let (description, fri) = opened(read(params)).unwrap();
         let mut rig = Self { puppet: Puppet::start(description), fri: Arc::new(Mutex::new(fri)), now: Instant::now() };
         rig.puppet.command("velocity", &[0.0; 7]);
         assert!(rig.advance(0.0, 0.0));
@@ -79,6 +83,25 @@ fn report(deflection: f64, wrong: f64) -> Report {
     let [measured, commanded] = [measured, HOME].map(|posture| posture.map(|q| q as f32));
     let fields: [(usize, &[f32]); 4] = [(148, &[0.004]), (216, &measured), (244, &pose), (292, &commanded)];
     Report::decode(&datagram(&fields, &[(144, 2), (146, 3), (180, 0x7F), (182, 3)])).unwrap()
+}
+
+/// An arm that has only rested since the run began may have been guided elsewhere during a halt.
+#[test]
+fn the_first_motion_begins_at_the_start_whatever_was_checked_before() {
+    let mut rig = Rig::of(&format!("{ARM}start = {HOME:?}\nstart_bounds = {{ posture = 0.02, deflection = 1.0 }}"));
+    rig.halt(0.0);
+    rig.resume();
+    assert!(!rig.advance(0.04, 0.0) && rig.step() == 0.0);
+    let refusal = rig.puppet.refusal().unwrap();
+    assert!(refusal.contains("`start_bounds.posture`"), "{refusal}");
+    let moves = (0..1000).any(|_| {
+        rig.resume();
+        rig.advance(0.0, 0.0) && rig.step() > 0.0
+    });
+    assert!(moves);
+    rig.halt(0.04);
+    rig.resume();
+    assert!(rig.advance(0.04, 0.0), "it was there once");
 }
 
 #[test]
