@@ -273,6 +273,9 @@ mod tests {
             ("0.2", "inf", "hand", "slide", "joint `slide` has no speed limit"),
             ("<limit effort=\"1\" velocity=\"3\"/>", "", "hand", "spin", "joint `spin` has no speed limit"),
             ("0 0 1\" rpy", "0 0 inf\" rpy", "hand", "up", "the origin of joint `up` is not finite"),
+            ("velocity=\"3\"", "velocity=\"180\"", "hand", "spin", "joint `spin` has a speed of 180 rad/s"),
+            ("0 0 1\" rpy", "0 0 162.5\" rpy", "hand", "up", "the origin of joint `up` is 162.5 m away"),
+            ("1.5707963267948966", "90", "hand", "up", "the origin of joint `up` is turned by 90 rad"),
             (
                 "link=\"post\"/><child link=\"sled\"",
                 "link=\"pole\"/><child link=\"sled\"",

@@ -43,21 +43,23 @@ struct Row<'b> {
 pub(super) fn guess(heard: &Heard) -> Option<Guess> {
     let row = row(&heard.bytes)?;
     let (begin, has_pause) = beginning(&row, &heard.pauses);
-    let frames: Vec<&[u8]> = row.bytes.get(begin..)?.chunks_exact(row.length).collect();
-    let constant: Vec<bool> = (0..row.length).map(|i| frames.iter().all(|frame| frame[i] == frames[0][i])).collect();
+    let bursts: Vec<&[u8]> = row.bytes.get(begin..)?.chunks_exact(row.length).collect();
+    let frames = packets_of(&bursts).unwrap_or(bursts);
+    let length = frames.first()?.len();
+    let constant: Vec<bool> = (0..length).map(|i| frames.iter().all(|frame| frame[i] == frames[0][i])).collect();
     let (frame, mark) = mark(frames[0], &constant)?;
     let is_trailer = frame == "trailer";
     let trailer = if is_trailer { mark.len() } else { 0 };
     let check = checksum(&frames, trailer);
     let digits: String = mark.iter().map(|byte| format!("{byte:02X}")).collect();
-    let mut findings = vec![format!("{} frames of {} bytes", frames.len(), row.length)];
+    let mut findings = vec![format!("{} frames of {length} bytes", frames.len())];
     findings.push(format!("each has {digits} at its {}", if is_trailer { "end" } else { "beginning" }));
     findings.push(match has_pause {
         true => "a pause is before each frame".to_owned(),
         false => "there is no pause between the frames: the mark may be at another place".to_owned(),
     });
     findings.extend(check.as_ref().map(|check| format!("the checksum is {check}")));
-    let end = row.length - trailer - check.as_deref().map_or(0, checksum_size);
+    let end = length - trailer - check.as_deref().map_or(0, checksum_size);
     let header = if is_trailer { 0 } else { mark.len() };
     let parts = numbering(&frames, header, end);
     let (offset, cell, count) = cells(&frames, parts.as_ref().map_or(header, |parts| parts.offset + 1), end);
@@ -65,7 +67,7 @@ pub(super) fn guess(heard: &Heard) -> Option<Guess> {
     let (rows, cols) = rows_and_cols(packets * count);
     let mut keys = vec![("frame", format!("{frame:?}"), ""), ("mark", format!("\"hex:{digits}\""), "")];
     keys.extend(check.as_ref().map(|check| ("check", format!("{check:?}"), "")));
-    keys.push(("length", row.length.to_string(), ""));
+    keys.push(("length", length.to_string(), ""));
     keys.push(("cell", format!("{cell:?}"), "check it"));
     keys.push(("offset", offset.to_string(), ""));
     keys.push(("shape", format!("[{rows}, {cols}]"), "rows and columns; check them"));
@@ -73,8 +75,21 @@ pub(super) fn guess(heard: &Heard) -> Option<Guess> {
         findings.push(format!("a byte counts them from {}: {packets} of them are an image", parts.first));
         keys.push(("parts", parts.key(count), ""));
     }
-    keys.push(("rate_hz", rate(heard.bytes.len() / row.length / packets, heard.seconds), "as it was heard"));
+    keys.push(("rate_hz", rate(heard.bytes.len() / length / packets, heard.seconds), "as it was heard"));
     Some(Guess { findings, keys })
+}
+
+/// Splits frames that are the packets of one image, one behind the other: each begins with the same byte and has its
+/// number behind that.
+fn packets_of<'b>(bursts: &[&'b [u8]]) -> Option<Vec<&'b [u8]>> {
+    let length = bursts.first()?.len();
+    let counts = (2..=length / MIN_LENGTH).filter(|count| length.is_multiple_of(*count));
+    counts.rev().find_map(|count| {
+        let packets: Vec<&[u8]> = bursts.iter().flat_map(|burst| burst.chunks_exact(length / count)).collect();
+        let has_mark = packets.iter().all(|packet| packet[0] == packets[0][0]);
+        let numbers = if has_mark { numbering(&packets, 1, length / count) } else { None };
+        (numbers?.count == count).then_some(packets)
+    })
 }
 
 /// Returns the name of the checksum that all frames have, if they differ. `trailer` bytes are behind it.
@@ -240,6 +255,21 @@ mod tests {
         let expected = ["frame = \"sync\"", "mark = \"hex:AA55\"", "length = 514", "shape = [16, 32]", "offset = 2"];
         assert_has(&keys(&heard(&frames, true)), &expected);
         assert_has(&keys(&heard(&frames, false)), &expected);
+    }
+
+    #[test]
+    fn packets_of_an_image_without_a_pause_between_them_are_found() {
+        let packet = |n: usize, number: u8| {
+            let mut packet = vec![0xAB, number];
+            packet.extend((0..64).map(|k| ((7 * n + 3 * k + 11 * usize::from(number)) % 251) as u8));
+            packet.push(packet.iter().fold(0, |xor, byte| xor ^ byte));
+            packet
+        };
+        let frames: Vec<Vec<u8>> = (0..20).map(|n| (0..4).flat_map(|number| packet(n, number)).collect()).collect();
+        let expected = ["mark = \"hex:AB\"", "length = 67", "check = \"xor8\"", "shape = [16, 16]"];
+        let found = keys(&heard(&frames, true));
+        assert_has(&found, &expected);
+        assert!(found.iter().any(|key| key.starts_with("parts = { index = { offset = 1, ")), "{found:?}");
     }
 
     #[test]
