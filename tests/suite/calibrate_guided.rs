@@ -276,18 +276,31 @@ fn a_controller_that_subtracts_the_weight_gets_what_its_payload_lacks() {
     }
     dialogue.hears(&["Posture 6"]);
     dialogue.write("done");
-    dialogue.hears(&["the controller subtracts 0.231 kg less than the tool weighs, at [0.0, 10.0, 50.0] mm"]);
+    dialogue.hears(&["the controller subtracts 0.231 kg less than the tool weighs, at [0.0, 10.0, 50.0] mm in the frame of the flange `tool0`"]);
     dialogue.hears(&["Which payload"]);
     dialogue.write("0.5 0 0");
     dialogue.hears(&["`0.5 0 0` is not a mass and three numbers"]);
     dialogue.hears(&["Which payload"]);
     dialogue.write("0.5 0 0 40");
     // (0.5 * 40 + 0.231 * 50) / 0.731 and 0.231 * 10 / 0.731.
-    dialogue.hears(&["set the payload to 0.731 kg with its centre at [0.0, 3.2, 43.2] mm"]);
+    dialogue.hears(&[
+        "set the payload to 0.731 kg with its centre at [0.0, 3.2, 43.2] mm in the frame of the flange `tool0`",
+    ]);
     assert_eq!((dialogue.end(), cell.now()), (0, cell.text.clone()), "{}", dialogue.said);
     robot.write("mark");
     robot.hears(&["\"mark\""]);
     assert!(!robot.said.contains("\"program\""), "no program was sent to the robot: {}", robot.said);
+}
+
+/// The payload is in the frame of the flange, and the result in that of the tip. Nothing connects.
+#[test]
+fn a_controller_whose_tip_is_not_the_flange_is_refused() {
+    let cell = Cell::new(
+        "[bind]\narm = \"arm\"\n[devices.arm]\ntype = \"ur\"\naddress = \"127.0.0.1\"\nrobot = \"builtin:ur5e.toml\"\n\
+         rtde_port = PORT\nflange = \"wrist_3_link\"\n",
+    );
+    let said = say(&["calibrate", "tool", cell.path.to_str().unwrap()]);
+    assert!(said.code == 2 && said.err.contains("flange `wrist_3_link`, but the tip of device `arm`"), "{}", said.err);
 }
 
 /// The flange of an LWR 4+ in its base: its table of Denavit and Hartenberg, with the distances of its maker [m].
@@ -361,7 +374,7 @@ const TOUCHES: [([f64; 7], [f64; 2]); 8] = [
     ([0.0, -0.2, 0.0, -0.2, -0.5, -0.3, 1.2], [-0.7, 0.0]),
 ];
 
-fn touched(link: &str) -> Cell {
+fn touched(link: &str, order: &str) -> Cell {
     Cell::new(&format!(
         "# My cell.
 [bind]
@@ -378,6 +391,7 @@ type = \"stream\"
 sensor = \"builtin:pads/flexitac_16x32.toml\"
 link = \"{link}\"
 pitch = {PITCH}
+order = {order}
 mount = {{ xyz = [0.0, 0.0, 0.08], rpy = [0.0, 0.0, 0.6] }} # measured with a ruler
 "
     ))
@@ -408,7 +422,7 @@ fn touch(cell: &Cell, pad: &mut Fake, arm: &mut Arm, touches: &[([f64; 7], [f64;
 #[test]
 fn the_mount_is_found_and_written_after_a_yes() {
     let mut pad = Fake::start("flexitac_16x32", "tcp");
-    let cell = touched(&pad.link);
+    let cell = touched(&pad.link, "[]");
     let mut arm = Arm::start(cell.port, &[]);
     let mut dialogue = touch(&cell, &mut pad, &mut arm, &TOUCHES);
     dialogue.hears(&["Posture 9"]);
@@ -430,7 +444,7 @@ fn the_mount_is_found_and_written_after_a_yes() {
 #[test]
 fn a_mount_that_is_not_confirmed_or_not_determined_is_not_written() {
     let mut pad = Fake::start("flexitac_16x32", "tcp");
-    let cell = touched(&pad.link);
+    let cell = touched(&pad.link, "[]");
     let mut arm = Arm::start(cell.port, &[]);
     let mut dialogue = touch(&cell, &mut pad, &mut arm, &TOUCHES[..5]);
     pad.does("release");
@@ -453,4 +467,19 @@ fn a_mount_that_is_not_confirmed_or_not_determined_is_not_written() {
     dialogue.hears(&["Type `yes`"]);
     dialogue.write("no");
     assert_eq!((dialogue.end(), cell.now()), (0, cell.text.clone()), "{}", dialogue.said);
+}
+
+/// The contacts of a mirrored image fit a mount whose z points into the tool, without a residual.
+#[test]
+fn a_mirrored_image_is_not_written_as_a_mount_that_points_inward() {
+    let mut pad = Fake::start("flexitac_16x32", "tcp");
+    let cell = touched(&pad.link, "[\"flip_x\"]");
+    let mut arm = Arm::start(cell.port, &[]);
+    let mut dialogue = touch(&cell, &mut pad, &mut arm, &TOUCHES);
+    dialogue.hears(&["Posture 9"]);
+    dialogue.write("done");
+    dialogue.hears(&["difference from the bench"]);
+    assert_eq!((dialogue.end(), cell.now()), (1, cell.text.clone()), "{}", dialogue.said);
+    assert!(!dialogue.said.contains("Type `yes`") && !dialogue.said.contains("warning"), "{}", dialogue.said);
+    arm.end();
 }

@@ -145,7 +145,21 @@ fn corners_in_the_base_show_a_wrong_mount() {
         let bench = bench(port).replace("[bind]\n", "[bind]\npad = \"skin\"\n") + &pad.replace("pad = \"skin\"\n", "");
         let said = dialogue(&bench, &[], &mut fake, |line| nearest(line, &truth));
         assert!(said.out.contains("of the base of `arm`, at ["), "{}", said.out);
+        assert!(said.out.contains("if the pad faces "), "{}", said.out);
         assert!(said.out.contains(expected), "{expected}: {}{}", said.out, said.err);
         assert_eq!(said.code, i32::from(yaw > 0.0), "{}", said.out);
     }
+}
+
+/// An arm without a position names no place in the base, so its `mount` does not judge the touches.
+#[test]
+fn a_silent_arm_leaves_the_corners_in_the_frame_of_the_pad() {
+    let (mut fake, port) = (Fake::start("flexitac_16x16", "pty"), free_udp_port());
+    let mount = "order = [\"flip_x\", \"flip_y\"]\nmount = { xyz = [0.0, 0.0, 0.03], rpy = [0.0, 0.0, 0.0] }";
+    let pad = pad_bench(&fake, "flexitac_16x16", mount).replace("[bind]\npad = \"skin\"\n", "");
+    let bench = bench(port).replace("[bind]\n", "[bind]\npad = \"skin\"\n") + &pad;
+    let said = dialogue(&bench, &[], &mut fake, as_asked);
+    assert!(said.out.contains("`arm` sends no position, so they are named in the frame of the pad"), "{}", said.out);
+    assert!(said.out.contains("warning: the image is turned by 180°, against how you held the pad"), "{}", said.out);
+    assert!(!said.out.contains("If the pad is turned on the arm"), "{}", said.out);
 }

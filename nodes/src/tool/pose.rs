@@ -9,9 +9,9 @@ use tactflow_runtime::cli::clap::{self, Parser};
 use tactflow_runtime::graph::{BenchDevice, OpenBench, open_bench};
 use tactflow_runtime::signal::{Image, Joint, Joints, Twist};
 
-use super::guided::{BoundRole, bound_role, chain};
+use super::guided::{BoundRole, bound_role, chain, mount};
 use crate::arm::chain::Chain;
-use crate::motion::pose::{pose_of, rotation_vector};
+use crate::motion::pose::{rotation_vector, rpy_of};
 
 /// Print where the model of an arm puts its tip and the pad on it
 #[derive(Parser)]
@@ -108,9 +108,14 @@ fn arm<'b>(args: &PoseArgs, bench: &'b OpenBench) -> Result<(BoundRole, &'b Benc
         })
         .collect();
     let names = arms.iter().map(|(bound, _)| format!("`{}`", bound.role)).collect::<Vec<_>>().join(", ");
+    // A device that fills several roles is the same arm in each.
+    let is_one = arms.windows(2).all(|two| {
+        let [(a, _), (b, _)] = two else { return true };
+        (&a.device, &a.side) == (&b.device, &b.side)
+    });
     match &args.arm {
         _ if arms.is_empty() => Err("the bench binds no arm".into()),
-        None if arms.len() > 1 => Err(format!("the bench binds several arms: name one of {names} with `--arm`")),
+        None if !is_one => Err(format!("the bench binds several arms: name one of {names} with `--arm`")),
         wanted => {
             let mut arms = arms.into_iter();
             let found = arms.find(|(bound, _)| wanted.as_ref().is_none_or(|wanted| bound.role == *wanted));
@@ -126,11 +131,7 @@ fn mounts(bench: &OpenBench, arm: &BoundRole) -> Vec<(String, IsometryMatrix3<f6
         let device = bench.devices.iter().find(|device| device.name == bound.device)?;
         let is_other_side = bound.device == arm.device && bound.side != arm.side;
         device.opened.description.output_on::<Image>(bound.side.as_deref(), "image").filter(|_| !is_other_side)?;
-        let mount = device.opened.description.fact_on(bound.side.as_deref(), "tactile_pad", "mount")?.as_table()?;
-        let three = |key: &str| -> Option<[f64; 3]> {
-            mount.get(key)?.as_array()?.iter().filter_map(number).collect::<Vec<_>>().try_into().ok()
-        };
-        Some((role.clone(), pose_of(three("xyz")?, three("rpy")?)))
+        Some((role.clone(), mount::stated(&device.opened.description, bound.side.as_deref())?.pose()))
     };
     bench.bind.iter().filter_map(mount).collect()
 }
@@ -156,12 +157,11 @@ fn pose(chain: &Chain, posture: &[f64]) -> IsometryMatrix3<f64> {
 fn line(what: &str, pose: &IsometryMatrix3<f64>) -> String {
     let at = pose.translation.vector;
     let turn = rotation_vector(&pose.rotation);
-    let (roll, pitch, yaw) = pose.rotation.euler_angles();
     let axis = |axis: Vector3<f64>| three(&(pose.rotation * axis), 3);
     format!(
         "{what} in the base: xyz {} m, rpy {} rad, rotation vector {} rad; its x points to {}, its z to {}\n",
         three(&at, 4),
-        three(&Vector3::new(roll, pitch, yaw), 4),
+        three(&rpy_of(&pose.rotation).into(), 4),
         three(&turn, 4),
         axis(Vector3::x()),
         axis(Vector3::z())

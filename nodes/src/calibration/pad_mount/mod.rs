@@ -7,6 +7,10 @@
 //! with R turned in its own frame: R exp([d]). It starts from the mount of the bench and from all quarter turns of it,
 //! so the result does not depend on a bad start.
 //!
+//! The third column of R, z of the pad, is not observed, because all contacts have z = 0: it follows from the other two, so
+//! that R is a rotation. An image that is mirrored by F = diag(-1, 1, 1) therefore fits as well, with R F diag(1, 1, -1) in
+//! place of R: z of the pad then points into the tool. [`MountFit::faces_away_from`] finds it.
+//!
 //! The contacts must be at different places of the pad, or the rotation is not observable. It is then kept as the bench
 //! states it. What is observable follows from the covariance of the solution under a noise of 0.5 mm, so from the postures
 //! and not from the residual.
@@ -32,14 +36,14 @@ const MAX_SHIFT_M: f64 = 0.003;
 
 /// A posture in which the pad touches the point.
 #[derive(Debug, Clone, Copy)]
-pub struct Touch {
+pub struct MountPosture {
     /// Pose of the tip in the base.
     pub tip: IsometryMatrix3<f64>,
     /// Centre of the contact on the pad, x and y in its frame [m].
     pub place: [f64; 2],
 }
 
-impl Touch {
+impl MountPosture {
     /// Returns where the touched point is in the base, with this mount of the pad.
     fn point(&self, mount: &IsometryMatrix3<f64>) -> Vector3<f64> {
         let [x, y] = self.place;
@@ -78,6 +82,13 @@ impl MountFit {
         (self.residuals.iter().map(|residual| residual * residual).sum::<f64>() / self.residuals.len() as f64).sqrt()
     }
 
+    /// Whether z of the pad is more than a right angle away from z of another mount.
+    #[must_use]
+    pub fn faces_away_from(&self, other: &IsometryMatrix3<f64>) -> bool {
+        let z = |mount: &IsometryMatrix3<f64>| mount.rotation * Vector3::z();
+        z(&self.mount).dot(&z(other)) < 0.0
+    }
+
     /// Returns the largest residual [m] and the index of its posture.
     #[must_use]
     pub fn largest(&self) -> (f64, usize) {
@@ -104,7 +115,7 @@ pub enum MountUnfit {
 ///
 /// # Errors
 /// If the postures are too few or too alike.
-pub fn fit(touches: &[Touch], present: &IsometryMatrix3<f64>) -> Result<MountFit, MountUnfit> {
+pub fn fit(touches: &[MountPosture], present: &IsometryMatrix3<f64>) -> Result<MountFit, MountUnfit> {
     if touches.len() < MIN_TOUCHES {
         return Err(MountUnfit::Few);
     }
@@ -121,7 +132,7 @@ pub fn fit(touches: &[Touch], present: &IsometryMatrix3<f64>) -> Result<MountFit
 }
 
 /// Solves for rotation and translation from the rotation of the bench and from all quarter turns of it.
-fn best_of_all_starts(touches: &[Touch], present: &IsometryMatrix3<f64>) -> Solution {
+fn best_of_all_starts(touches: &[MountPosture], present: &IsometryMatrix3<f64>) -> Solution {
     let starts = quarter_turns().map(|turn| present.rotation * turn);
     let solutions = starts.map(|start| solve(touches, &start, Unknown::Pose));
     let best = solutions.min_by(|a, b| a.cost.total_cmp(&b.cost));
@@ -134,7 +145,7 @@ fn check_shift(solution: &Solution) -> Result<(), MountUnfit> {
     if deviation > MAX_SHIFT_M { Err(MountUnfit::Alike { axis, deviation }) } else { Ok(()) }
 }
 
-fn fitted(touches: &[Touch], solution: &Solution, turn: Result<Vector3<f64>, KeptRotation>) -> MountFit {
+fn fitted(touches: &[MountPosture], solution: &Solution, turn: Result<Vector3<f64>, KeptRotation>) -> MountFit {
     let mount = solution.mount;
     let residuals = touches.iter().map(|touch| (touch.point(&mount) - solution.point).norm()).collect();
     let shift_deviation = diagonal_roots(&solution.shift_covariance(solution.noise()));

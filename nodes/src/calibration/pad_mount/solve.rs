@@ -2,7 +2,7 @@
 
 use nalgebra::{IsometryMatrix3, Matrix3, Rotation3, SMatrix, SVector, Translation3, Vector3};
 
-use super::Touch;
+use super::MountPosture;
 
 /// Unknowns: rotation, translation and point.
 const UNKNOWNS: usize = 9;
@@ -67,7 +67,7 @@ struct State {
 }
 
 impl State {
-    fn cost(&self, touches: &[Touch]) -> f64 {
+    fn cost(&self, touches: &[MountPosture]) -> f64 {
         touches.iter().map(|touch| (touch.point(&self.mount) - self.point).norm_squared()).sum()
     }
 
@@ -81,7 +81,7 @@ impl State {
 }
 
 /// Solves from a rotation.
-pub(super) fn solve(touches: &[Touch], rotation: &Rotation3<f64>, unknown: Unknown) -> Solution {
+pub(super) fn solve(touches: &[MountPosture], rotation: &Rotation3<f64>, unknown: Unknown) -> Solution {
     let start = IsometryMatrix3::from_parts(Translation3::identity(), *rotation);
     let points = touches.iter().map(|touch| touch.point(&start));
     let mut state = State { mount: start, point: points.sum::<Vector3<f64>>() / touches.len() as f64 };
@@ -114,7 +114,7 @@ fn descend(information: &Information, gradient: &Step, state: &State, damping: f
 }
 
 /// Returns J'J and J'r. The rows and columns of a given rotation are zero.
-fn normal(touches: &[Touch], state: &State, unknown: Unknown) -> (Information, Step) {
+fn normal(touches: &[MountPosture], state: &State, unknown: Unknown) -> (Information, Step) {
     let (mut information, mut gradient) = (Information::zeros(), Step::zeros());
     for touch in touches {
         let jacobian = jacobian(touch, &state.mount, unknown);
@@ -127,7 +127,7 @@ fn normal(touches: &[Touch], state: &State, unknown: Unknown) -> (Information, S
 
 /// Returns the derivative of a residual: -R_i R [s_i] by a turn of the pad in its own frame, R_i by the translation, and
 /// -1 by the point.
-fn jacobian(touch: &Touch, mount: &IsometryMatrix3<f64>, unknown: Unknown) -> SMatrix<f64, 3, UNKNOWNS> {
+fn jacobian(touch: &MountPosture, mount: &IsometryMatrix3<f64>, unknown: Unknown) -> SMatrix<f64, 3, UNKNOWNS> {
     let mut jacobian = SMatrix::<f64, 3, UNKNOWNS>::zeros();
     let [x, y] = touch.place;
     if unknown == Unknown::Pose {
@@ -153,7 +153,7 @@ mod tests {
             point in prop::array::uniform3(-1.0..1.0_f64),
         ) {
             const H: f64 = 1e-6;
-            let touch = Touch { tip: tip.0, place };
+            let touch = MountPosture { tip: tip.0, place };
             let state = State { mount: mount.0, point: point.into() };
             let jacobian = jacobian(&touch, &state.mount, Unknown::Pose);
             let residual = |step: &Step| {

@@ -21,12 +21,12 @@ fn mount() -> IsometryMatrix3<f64> {
 }
 
 /// Returns touches of a point: the tip is where its rotation and the place on the pad put it.
-fn touches(rotations: &[Rotation3<f64>], places: &[[f64; 2]], mount: &IsometryMatrix3<f64>) -> Vec<Touch> {
+fn touches(rotations: &[Rotation3<f64>], places: &[[f64; 2]], mount: &IsometryMatrix3<f64>) -> Vec<MountPosture> {
     let point = Point3::new(0.5, -0.2, 0.1);
     let touch = |(rotation, place): (&Rotation3<f64>, &[f64; 2])| {
         let reach = rotation * (mount * Point3::new(place[0], place[1], 0.0)).coords;
         let tip = IsometryMatrix3::from_parts(Translation3::from(point.coords - reach), *rotation);
-        Touch { tip, place: *place }
+        MountPosture { tip, place: *place }
     };
     rotations.iter().zip(places).map(touch).collect()
 }
@@ -36,8 +36,11 @@ fn tilts() -> Vec<Rotation3<f64>> {
 }
 
 /// Shifts each contact by a noise [m].
-fn noisy(touches: &[Touch], noise: f64, random: &mut Random) -> Vec<Touch> {
-    touches.iter().map(|touch| Touch { place: touch.place.map(|at| at + noise * random.normal()), ..*touch }).collect()
+fn noisy(touches: &[MountPosture], noise: f64, random: &mut Random) -> Vec<MountPosture> {
+    touches
+        .iter()
+        .map(|touch| MountPosture { place: touch.place.map(|at| at + noise * random.normal()), ..*touch })
+        .collect()
 }
 
 /// Returns the distance [m] and the angle [rad] between two mounts.
@@ -74,6 +77,24 @@ proptest! {
     }
 }
 
+/// A mirrored image fits without a residual, with z of the pad into the tool.
+#[test]
+fn a_mirrored_image_fits_with_z_into_the_tool() {
+    let exact = touches(&tilts(), &PLACES, &mount());
+    assert!(!fit(&exact, &mount()).unwrap().faces_away_from(&mount()));
+    for [sx, sy] in [[-1.0, 1.0], [1.0, -1.0]] {
+        let mirror =
+            |touch: &MountPosture| MountPosture { place: [sx * touch.place[0], sy * touch.place[1]], ..*touch };
+        let mirrored: Vec<_> = exact.iter().map(mirror).collect();
+        let found = fit(&mirrored, &mount()).unwrap();
+        assert!(found.rms() < 1e-8 && found.turn_deviation.is_ok(), "{found:?}");
+        assert!(found.faces_away_from(&mount()), "{found:?}");
+        // The wrong mount explains the right image too: what differs is only the mount that it is compared with.
+        let inward = mount() * pose_of([0.0; 3], [PI, 0.0, 0.0]);
+        assert!(!found.faces_away_from(&inward) && fit(&exact, &inward).unwrap().faces_away_from(&inward));
+    }
+}
+
 /// The stated standard deviations are those of many fits with other noise.
 #[test]
 fn the_deviations_are_those_of_many_fits() {
@@ -82,9 +103,9 @@ fn the_deviations_are_those_of_many_fits() {
     let mut random = Random::new(3, 0);
     let [mut squares, mut stated] = [[0.0; 6]; 2];
     for _ in 0..RUNS {
-        let noise = |touch: &Touch, random: &mut Random| {
+        let noise = |touch: &MountPosture, random: &mut Random| {
             let shift = Vector3::from_fn(|_, _| 0.0004 * random.normal());
-            Touch { tip: Translation3::from(shift) * touch.tip, ..*touch }
+            MountPosture { tip: Translation3::from(shift) * touch.tip, ..*touch }
         };
         let noisy: Vec<_> = exact.iter().map(|touch| noise(touch, &mut random)).collect();
         let found = fit(&noisy, &mount()).unwrap();

@@ -3,18 +3,18 @@
 use std::path::PathBuf;
 
 use nalgebra::IsometryMatrix3;
-use tactflow_runtime::cli::Shell;
 use tactflow_runtime::cli::clap::{self, Args};
+use tactflow_runtime::cli::{FAULTED, Shell};
 use tactflow_runtime::signal::{Image, Shape};
 use toml_edit::{InlineTable, Value};
 
 use super::average::Average;
 use super::contact::Unloaded;
-use super::mount_text::{described, progress, report};
+use super::mount_text::{described, facing, progress, report};
 use crate::arm::mount::Mount;
-use crate::calibration::pad_mount::{MountFit, Touch, fit, outlier};
+use crate::calibration::pad_mount::{MountFit, MountPosture, fit, outlier};
 use crate::motion::pose::rpy_of;
-use crate::tool::guided::{BenchFile, BoundRole, CellPort, GuidedArm, GuidedCell, Left, numbers};
+use crate::tool::guided::{BenchFile, BoundRole, CellPort, GuidedArm, GuidedCell, Left, mount, numbers};
 
 /// Measure where a pad is on the arm: touch one fixed point in four postures
 #[derive(Args)]
@@ -27,7 +27,7 @@ Examples:
   tactflow calibrate mount cell.toml
   tactflow calibrate mount cell.toml --pad left_pad --arm left_arm
 
-Exit codes: 0 success; 1 a device failed; 2 the bench cannot be used."
+Exit codes: 0 success; 1 a device failed, or z of the pad points away from that of the bench; 2 the bench cannot be used."
 )]
 pub(super) struct MountArgs {
     /// Bench file
@@ -77,13 +77,7 @@ impl Pad {
     fn find(cell: &GuidedCell<'_>, args: &MountArgs) -> Result<Self, String> {
         let (bound, image) = cell.role::<Image>("image", "a pad", args.pad.as_deref(), "--pad")?;
         let description = cell.device(image).description();
-        let fact = description.fact_on(bound.side.as_deref(), "tactile_pad", "mount");
-        let list = |name: &str| -> Option<[f64; 3]> {
-            let list: Vec<f64> =
-                fact?.get(name)?.as_array()?.iter().map(toml::Value::as_float).collect::<Option<_>>()?;
-            list.try_into().ok()
-        };
-        let present = Mount { xyz: list("xyz").unwrap_or_default(), rpy: list("rpy").unwrap_or_default() };
+        let present = mount::stated(description, bound.side.as_deref()).unwrap_or(Mount::NONE);
         let arm = GuidedArm::find(cell, args.arm.as_deref())?;
         Ok(Self { bound, image, arm, present })
     }
@@ -96,7 +90,7 @@ impl Pad {
              Enter measures, `drop 3` drops posture 3, `done` ends.",
         );
         let unloaded = self.unloaded(cell)?;
-        let mut touches: Vec<Touch> = Vec::new();
+        let mut touches: Vec<MountPosture> = Vec::new();
         loop {
             let fitted = fit(&touches, &present);
             let worst = fitted.as_ref().ok().and_then(|all| outlier(&touches, &present, all));
@@ -141,12 +135,16 @@ impl Pad {
     }
 
     /// Measures a posture and its contact. Returns the number of its tactels too.
-    fn measure(&self, cell: &mut GuidedCell<'_>, unloaded: &Unloaded) -> Result<Result<(Touch, usize), String>, Left> {
+    fn measure(
+        &self,
+        cell: &mut GuidedCell<'_>,
+        unloaded: &Unloaded,
+    ) -> Result<Result<(MountPosture, usize), String>, Left> {
         let mut average = Average::of(cell, self.image, unloaded.means.len());
         let still = self.arm.still(cell, |cell| average.look(cell))?;
         Ok(still.and_then(|still| {
             let contact = unloaded.contact(average.means("the pad", MIN_SAMPLES)?)?;
-            Ok((Touch { tip: still.tip, place: contact.place }, contact.tactels))
+            Ok((MountPosture { tip: still.tip, place: contact.place }, contact.tactels))
         }))
     }
 
@@ -154,6 +152,10 @@ impl Pad {
     fn conclude(&self, cell: &mut GuidedCell<'_>, found: &MountFit, bench: &mut BenchFile) -> Result<u8, Left> {
         let shell = cell.shell();
         shell.say(&format!("\n{}", report(found, &self.present.pose())));
+        if found.turn_deviation.is_ok() && found.faces_away_from(&self.present.pose()) {
+            shell.error(facing(&self.present.pose(), bench.path()));
+            return Ok(FAULTED);
+        }
         let mount = self.written(found);
         if self.bound.side.is_some() {
             shell.say(&format!(

@@ -1,14 +1,16 @@
 //! What `tactflow calibrate mount` prints about a mount.
 
+use std::path::Path;
+
 use nalgebra::{IsometryMatrix3, Vector3};
 
 use crate::calibration::pad_mount::{
-    DOUBTFUL_RESIDUAL_M, KeptRotation, MIN_TOUCHES, MountFit, MountUnfit, Outlier, Touch,
+    DOUBTFUL_RESIDUAL_M, KeptRotation, MIN_TOUCHES, MountFit, MountPosture, MountUnfit, Outlier,
 };
 use crate::motion::pose::{rotation_vector, rpy_of};
 
 /// Describes a posture that was measured.
-pub(super) fn described(touch: &Touch, tactels: usize) -> String {
+pub(super) fn described(touch: &MountPosture, tactels: usize) -> String {
     let [x, y] = touch.place.map(|at| at * 1e3);
     let coarse = if tactels == 1 { "; one tactel shows its place only within half a pitch" } else { "" };
     format!("  contact at x {x:.1} mm, y {y:.1} mm on the pad, on {tactels} tactels{coarse}")
@@ -62,6 +64,17 @@ pub(super) fn report(found: &MountFit, present: &IsometryMatrix3<f64>) -> String
     lines.join("\n")
 }
 
+/// Says why a mount is not written whose z points away from that of the bench.
+pub(super) fn facing(present: &IsometryMatrix3<f64>, bench: &Path) -> String {
+    let (bench, z) = (bench.display(), direction_of(&(present.rotation * Vector3::z())));
+    format!(
+        "z of the measured mount points away from z of the bench, so nothing is written. The contacts do not show which way z \
+         points, and one of two is wrong: the image is mirrored, which `tactflow doctor {bench} --press` finds, or z of `mount` \
+         in the bench, which is {z} of the tip, points into the tool and not out of the pad: `tactflow pose {bench}` prints \
+         where z points"
+    )
+}
+
 fn residual(found: &MountFit) -> String {
     let (largest, index) = found.largest();
     let rms = found.rms();
@@ -98,6 +111,15 @@ fn direction(axis: &Vector3<f64>) -> String {
     named.map_or_else(|| format!("[{:.2}, {:.2}, {:.2}]", axis.x, axis.y, axis.z), |(_, name)| name.to_owned())
 }
 
+/// Names a direction with its sign: an axis if it is near to one.
+fn direction_of(axis: &Vector3<f64>) -> String {
+    let name = direction(&axis.abs());
+    match name.len() {
+        1 => format!("{}{name}", if axis[axis.iamax()] < 0.0 { '-' } else { '+' }),
+        _ => direction(axis),
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -125,6 +147,14 @@ mod tests {
         ] {
             assert!(text.contains(part), "{part}: {text}");
         }
+    }
+
+    #[test]
+    fn both_causes_of_a_z_that_points_away_are_named() {
+        let up = facing(&pose_of([0.0; 3], [0.0; 3]), Path::new("cell.toml"));
+        assert!(up.contains("`tactflow doctor cell.toml --press`") && up.contains("which is +z of the tip"), "{up}");
+        let inward = facing(&pose_of([0.0; 3], [std::f64::consts::PI, 0.0, 0.0]), Path::new("cell.toml"));
+        assert!(inward.contains("which is -z of the tip"), "{inward}");
     }
 
     #[test]

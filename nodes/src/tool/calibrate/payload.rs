@@ -5,25 +5,43 @@ use nalgebra::Vector3;
 use crate::calibration::tool_weight::WeightFit;
 use crate::tool::guided::{GuidedCell, Left};
 
-/// Prints what to correct in the payload of a controller that subtracts the weight itself. Returns the exit code.
-pub(super) fn payload(cell: &mut GuidedCell<'_>, found: &WeightFit) -> Result<u8, Left> {
+/// Checks that the frame of the tip is that of the flange, in which a controller expects the centre of its payload.
+///
+/// # Errors
+/// If the device names another link as its `flange`.
+pub(super) fn check_flange(params: &toml::Table, device: &str, tip: &str) -> Result<(), String> {
+    match params.get("flange").and_then(toml::Value::as_str) {
+        Some(flange) if flange != tip => Err(format!(
+            "the controller expects the centre of the payload in the frame of the flange `{flange}`, but the tip of device \
+             `{device}` is `{tip}`: write `tip = \"{flange}\"` into a copy of the bench, and weigh the tool with it"
+        )),
+        _ => Ok(()),
+    }
+}
+
+/// Prints what to correct in the payload of a controller that subtracts the weight itself. `tip` is the link of the tip,
+/// which is the flange. Returns the exit code.
+pub(super) fn payload(cell: &mut GuidedCell<'_>, found: &WeightFit, tip: &str) -> Result<u8, Left> {
     let shell = cell.shell();
     let (by, side) = (found.mass.abs(), if found.mass > 0.0 { "less" } else { "more" });
     shell.say(&format!(
-        "the controller subtracts {by:.3} kg {side} than the tool weighs, at {} mm in the frame of the tip",
+        "the controller subtracts {by:.3} kg {side} than the tool weighs, at {} mm in the frame of the flange `{tip}`",
         millimetres(&found.centre)
     ));
-    let question = "Which payload is set on the robot? Write its mass [kg] and its centre x y z [mm], such as \
-                    `0.35 0 0 40`, or press Enter to end:";
+    let question = format!(
+        "Which payload is set on the robot? Write its mass [kg] and its centre x y z in the frame of the flange `{tip}` [mm], \
+         such as `0.35 0 0 40`, or press Enter to end:"
+    );
     loop {
-        let answer = cell.ask(question)?;
+        let answer = cell.ask(&question)?;
         if answer.is_empty() {
             return Ok(0);
         }
         match corrected(&answer, found) {
             Ok((mass, centre)) => {
                 shell.say(&format!(
-                    "set the payload to {mass:.3} kg with its centre at {} mm, and `tool_mass = {mass:.3}` in the bench if it has one",
+                    "set the payload to {mass:.3} kg with its centre at {} mm in the frame of the flange `{tip}`, and \
+                     `tool_mass = {mass:.3}` in the bench if it has one",
                     millimetres(&centre)
                 ));
                 return Ok(0);
@@ -80,6 +98,15 @@ mod tests {
         assert!((mass - 2.0).abs() < 1e-12 && (centre - Vector3::new(0.0, 0.0, 0.05)).norm() < 1e-12);
         let (mass, centre) = corrected("2 0 0 50", &found(-1.0, [0.0, 0.0, 0.1])).expect("the way back");
         assert!((mass - 1.0).abs() < 1e-12 && centre.norm() < 1e-12);
+    }
+
+    #[test]
+    fn a_tip_that_is_not_the_flange_is_refused() {
+        let params = |text: &str| -> toml::Table { text.parse().expect("TOML") };
+        assert!(check_flange(&params(""), "arm", "tool0").is_ok());
+        assert!(check_flange(&params("flange = \"tool0\""), "arm", "tool0").is_ok());
+        let message = check_flange(&params("flange = \"wrist_3_link\""), "arm", "tool0").expect_err("two links");
+        assert!(message.contains("`wrist_3_link`, but the tip of device `arm` is `tool0`"), "{message}");
     }
 
     #[test]

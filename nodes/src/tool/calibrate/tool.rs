@@ -1,14 +1,15 @@
 //! `tactflow calibrate tool`: the mass and the centre of mass of the tool, from the force sensor of a still arm.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use nalgebra::Vector3;
 use tactflow_runtime::cli::clap::{self, Args};
 use tactflow_runtime::cli::{FAULTED, Shell};
+use tactflow_runtime::graph::open_bench;
 use tactflow_runtime::signal::{Features, FeaturesShape, Joints, Shape};
 
 use super::average::Average;
-use super::payload::{millimetres, payload};
+use super::payload::{check_flange, millimetres, payload};
 use crate::calibration::tool_weight::{
     MIN_POSTURES, MIN_SPREAD, WeightFit, WeightPosture, WeightUnfit, fit, next_side, side_down,
 };
@@ -52,6 +53,8 @@ struct Sensor {
     arm: GuidedArm,
     /// Mass [kg] and centre [m] of the weight that the device subtracts, or `None` if the controller does it.
     subtracted: Option<(f64, Vector3<f64>)>,
+    /// Link of the tip, in whose frame the centre is.
+    tip: String,
 }
 
 pub(super) fn run(args: &ToolArgs, shell: &Shell) -> u8 {
@@ -81,7 +84,13 @@ impl Sensor {
         let is_own = cell.port::<Joints>(&bound, "position").is_some();
         let own = is_own.then_some(&*bound.role);
         let arm = GuidedArm::find(cell, args.arm.as_deref().or(own))?;
-        Ok(Self { bound, wrench, arm, subtracted })
+        let carrier = cell.device(arm.position).description();
+        let tip = carrier.fact_on(arm.bound.side.as_deref(), "velocity_arm", "tip").and_then(toml::Value::as_str);
+        let tip = tip.unwrap_or("the tip").to_owned();
+        if subtracted.is_none() {
+            check_flange(&params(cell, &args.bench, &arm.bound.device)?, &arm.bound.device, &tip)?;
+        }
+        Ok(Self { bound, wrench, arm, subtracted, tip })
     }
 
     /// Asks for postures until they are enough.
@@ -127,6 +136,13 @@ impl Sensor {
             Ok(WeightPosture { tip, wrench: std::array::from_fn(|i| means[i] + added[i]) })
         }))
     }
+}
+
+/// Returns the parameters of a device of a bench, with those of its robot file.
+fn params(cell: &GuidedCell<'_>, bench: &Path, device: &str) -> Result<toml::Table, String> {
+    let bench = open_bench(cell.shell().catalogue(), bench).map_err(|report| report.render(false))?;
+    let device = bench.devices.into_iter().find(|found| found.name == device);
+    Ok(device.map(|device| device.params).unwrap_or_default())
 }
 
 fn has_six(shape: &FeaturesShape) -> bool {
@@ -191,12 +207,13 @@ fn conclude(cell: &mut GuidedCell<'_>, sensor: &Sensor, found: &WeightFit, bench
     }
     if found.force_residual > DOUBTFUL_PART * weight {
         shell.warning(format_args!(
-            "the residual of {:.2} N is large for a weight of {weight:.2} N: did something touch the tool?",
+            "the residual of {:.2} N is large for a weight of {weight:.2} N: did something touch the tool, or is z of the base not \
+             vertical?",
             found.force_residual
         ));
     }
     match sensor.subtracted {
-        None => payload(cell, found),
+        None => payload(cell, found, &sensor.tip),
         Some(_) if found.mass < 0.0 => {
             shell.error(format_args!(
                 "the mass is {:.3} kg: either the force sensor has the wrong sign, or the load that is set on the controller is \

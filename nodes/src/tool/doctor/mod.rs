@@ -47,13 +47,13 @@ Examples:
 
 With `--press`, it asks you to press the four corners of each pad, one after the other, and names a flipped or swapped axis
 with the line that corrects it. If the pad has a `mount`, the corners are named in the base of the arm, so that a mistake in
-the mount shows too.
+the mount shows too. Then also check that the pad faces the direction that it prints.
 
 With `--move`, it also proves that each real arm stops by itself when its commands cease, and notes the proof in a file
 beside the bench. Until then, `tactflow run` uses a tenth of the limits of speed and acceleration.
 
 Exit codes: 0 no problem; 1 a device failed, sent nothing or would not move, or an axis of a pad is wrong; 2 the bench does
-not load; 130 Ctrl-C ended `--press`."
+not load; 130 Ctrl-C ended `--press`. A turned image is a warning, with exit code 0, if its corners were not named in the base."
 )]
 pub(super) struct DoctorArgs {
     /// Bench file

@@ -153,7 +153,7 @@ impl Port {
 }
 
 impl Content {
-    /// Returns what is to be seen of an output; `None` if nothing is.
+    /// Returns what to watch of an output, or `None` if its values are not watched.
     fn of(description: &Description, side: Option<&str>, name: &str, shape: &Shape) -> Option<Self> {
         Some(match shape {
             Shape::Image(shape) => Self::Noise(description.output_on(side, name)?, Noise::new(shape.clone())),

@@ -25,6 +25,11 @@ pub(super) fn in_base(corner: [f64; 2], pose: &IsometryMatrix3<f64>) -> String {
     format!("the corner toward {x} and toward {y}")
 }
 
+/// Names the direction in the base to which z of the pad points.
+pub(super) fn facing(pose: &IsometryMatrix3<f64>) -> String {
+    direction(&(pose.rotation * Vector3::z()))
+}
+
 /// Returns a point of the pad in the base [m].
 pub(super) fn point(place: [f64; 2], pose: &IsometryMatrix3<f64>) -> [f64; 3] {
     (pose * Point3::new(place[0], place[1], 0.0)).coords.into()
@@ -66,6 +71,7 @@ mod tests {
         // The sensor looks down: a half turn about x takes y to -y and z to -z.
         let down = pose_of([0.5, 0.1, 0.3], [2.0 * FRAC_PI_2, 0.0, 0.0]);
         assert_eq!(in_base(CORNERS[1], &down), "the corner toward +x and toward +y");
+        assert_eq!(facing(&down), "-z");
         let [x, y, z] = point([0.02, -0.01], &down);
         assert!((x - 0.52).abs() < 1e-12 && (y - 0.11).abs() < 1e-12 && (z - 0.3).abs() < 1e-12);
         // x of the sensor is between x and z of the base, and y is y.

@@ -8,12 +8,12 @@ use tactflow_runtime::cli::{FAULTED, INTERRUPTED, Shell, clap, duration};
 use tactflow_runtime::signal::{Image, ImageShape, Shape};
 
 use super::pad::Noise;
-use super::remedy::{Described, judge};
+use super::remedy::{Described, OnArm, judge};
 use super::symmetry::CORNERS;
 use super::touch::{Event, Feeler, Touch};
 use super::{Finding, Severity, place, print};
 use crate::arm::mount::Mount;
-use crate::tool::guided::{BoundRole, CellPort, GuidedArm, GuidedCell, Left};
+use crate::tool::guided::{BoundRole, CellPort, GuidedArm, GuidedCell, Left, mount};
 
 /// Time that a pad has for its first image [s].
 const FIRST_IMAGE_S: f64 = 10.0;
@@ -105,11 +105,12 @@ impl Dialogue<'_> {
                 (_, Some((unloaded, threshold))) => {
                     let feeler = Feeler::new(pad.shape.clone(), unloaded.to_vec(), threshold);
                     let device = devices.iter().find(|device| device.name == pad.bound.device);
-                    match (self.corners(pad, feeler)?, device) {
-                        (Ok(touches), Some(device)) => {
-                            let mount = pad.mount.as_ref().filter(|_| self.arm.is_some());
-                            judge(device, mount, &pad.shape, &touches)
-                        }
+                    let on_arm = self.on_arm(pad);
+                    let touched = self.corners(pad, on_arm.as_ref(), feeler)?;
+                    // The arm may have been guided meanwhile.
+                    let on_arm = on_arm.map(|before| self.on_arm(pad).unwrap_or(before));
+                    match (touched, device) {
+                        (Ok(touches), Some(device)) => judge(device, on_arm.as_ref(), &pad.shape, &touches),
                         (Err(why), _) => Finding::problem(why),
                         (Ok(_), None) => continue,
                     }
@@ -130,25 +131,27 @@ impl Dialogue<'_> {
         done.map(drop)
     }
 
-    /// Asks for the corners of a pad. The inner error says why there are none.
-    fn corners(&mut self, pad: &Pad, mut feeler: Feeler) -> Result<Result<[Touch; 4], String>, Left> {
+    /// Asks for the corners of a pad, in the base if it is on an arm. The inner error says why there are none.
+    fn corners(
+        &mut self,
+        pad: &Pad,
+        on_arm: Option<&OnArm>,
+        mut feeler: Feeler,
+    ) -> Result<Result<[Touch; 4], String>, Left> {
         let shell = self.cell.shell();
-        let is_on_arm = self.arm.is_some() && pad.mount.is_some();
-        shell.say(&match is_on_arm {
-            true => format!("\nThe corners of `{}`. Release the pad after each one.", pad.bound.role),
-            false => format!(
-                "\nThe corners of `{}`. Look at the pad from outside, so that z points to you, x to the right and y up. Release \
-                 the pad after each one.",
-                pad.bound.role
-            ),
-        });
+        shell.say(&self.introduction(pad, on_arm));
         let mut touches = Vec::new();
         for corner in CORNERS {
-            let pose = self.pose(pad);
+            let pose = self.pose(pad).filter(|_| on_arm.is_some());
+            if on_arm.is_some() && pose.is_none() {
+                return Ok(Err(
+                    "the arm sends no position any more, so its corners have no place in the base".to_owned()
+                ));
+            }
             shell.say(&format!("press {}{}", self.name(corner, pose.as_ref()), at(corner, pad, pose.as_ref())));
             let event = self.next_event(pad, &mut feeler)?;
             let Some(Event::Touched(touch)) = event else { return Ok(Err(self.nobody(pad, &feeler))) };
-            let [x, y] = touch.contact.centre;
+            let [x, y] = touch.spot.centre;
             let felt = [x, y].map(f64::signum);
             let is_right = felt == corner;
             let what =
@@ -160,6 +163,28 @@ impl Dialogue<'_> {
             }
         }
         Ok(touches.try_into().map_err(|_| "there are not four touches".to_owned()))
+    }
+
+    /// Says how the corners of a pad are named.
+    fn introduction(&self, pad: &Pad, on_arm: Option<&OnArm>) -> String {
+        let role = &pad.bound.role;
+        if on_arm.is_some() {
+            return format!("\nThe corners of `{role}`. Release the pad after each one.");
+        }
+        let silent = self.arm.as_ref().filter(|_| pad.mount.is_some()).map_or_else(String::new, |arm| {
+            format!(" `{}` sends no position, so they are named in the frame of the pad.", arm.bound.role)
+        });
+        format!(
+            "\nThe corners of `{role}`.{silent} Look at the pad from outside, so that z points to you, x to the right and y up. \
+             Release the pad after each one."
+        )
+    }
+
+    /// Returns the mount of a pad and where it faces now, if its corners can be named in the base.
+    fn on_arm(&self, pad: &Pad) -> Option<OnArm> {
+        let (pose, arm) = (self.pose(pad)?, self.arm.as_ref()?);
+        let facing = format!("{} of the base of `{}`", place::facing(&pose), arm.bound.role);
+        Some(OnArm { mount: pad.mount.clone()?, facing })
     }
 
     /// Waits for a touch or a release. Returns `None` if there is none in time.
@@ -226,18 +251,12 @@ fn pads(cell: &GuidedCell<'_>) -> Vec<Pad> {
         if pads.iter().any(is_known) {
             continue;
         }
-        let mount = description.fact_on(bound.side.as_deref(), "tactile_pad", "mount").and_then(mount);
+        let mount = mount::stated(description, bound.side.as_deref());
         let noise = Noise::new(shape.clone());
         let (bound, shape) = (bound.clone(), shape.clone());
         pads.push(Pad { bound, port, shape, mount, noise, writes: 0, first: None });
     }
     pads
-}
-
-/// Reads the fact of where a pad is on its arm.
-fn mount(fact: &toml::Value) -> Option<Mount> {
-    let list = |name: &str| -> Option<[f64; 3]> { fact.get(name)?.clone().try_into().ok() };
-    Some(Mount { xyz: list("xyz")?, rpy: list("rpy")? })
 }
 
 impl Pad {

@@ -5,10 +5,10 @@ use tactflow_runtime::signal::{Image, ImageShape};
 
 use super::Finding;
 use super::symmetry::Symmetry;
-use super::touch::{Contact, Touch, contact};
+use super::touch::{Spot, Touch, spot};
 use crate::arm::mount::Mount;
 use crate::devices::stream::{Grid, Turn};
-use crate::motion::pose::pose_of;
+use crate::motion::pose::rpy_of;
 
 /// A device of the bench, as its files describe it.
 #[derive(Debug, Clone)]
@@ -40,10 +40,22 @@ impl Described {
     }
 }
 
-/// Judges the four touches of a pad, in the order of the corners. `mount` is the pose of the pad on the tip of its arm;
-/// `None` if the corners were named in the pad's own frame.
-pub(super) fn judge(device: &Described, mount: Option<&Mount>, shape: &ImageShape, touches: &[Touch; 4]) -> Finding {
-    let felt = touches.each_ref().map(|touch| in_halves(&touch.contact, shape));
+/// A pad whose corners were named in the base of its arm.
+#[derive(Debug, Clone)]
+pub(super) struct OnArm {
+    /// Its pose on the tip, as the bench states it.
+    pub(super) mount: Mount,
+    /// Where its z points by this mount: `+x of the base of `arm``.
+    pub(super) facing: String,
+}
+
+/// Judges the four touches of a pad, in the order of the corners. `on_arm` is `None` if the corners were named in the pad's
+/// own frame.
+///
+/// In the base, a mirrored image looks like a mount whose z points into the tool, and both together look right. Only the
+/// person sees where the pad faces.
+pub(super) fn judge(device: &Described, on_arm: Option<&OnArm>, shape: &ImageShape, touches: &[Touch; 4]) -> Finding {
+    let felt = touches.each_ref().map(|touch| in_halves(&touch.spot, shape));
     if let Some((swapped, turns)) = reshaped(device, shape, touches) {
         return Finding::problem(format!(
             "one touch shows in several places of the image: `shape` is wrong. {}",
@@ -53,19 +65,22 @@ pub(super) fn judge(device: &Described, mount: Option<&Mount>, shape: &ImageShap
     let Some(symmetry) = Symmetry::of(&felt) else { return nothing_fits(&felt) };
     let fault = symmetry.fault();
     if symmetry == Symmetry::IDENTITY {
-        return Finding::fine("all four corners are where they should be");
+        let confirm = on_arm.map_or_else(String::new, |OnArm { facing, .. }| {
+            format!(
+                ", if the pad faces {facing}, where z of its `mount` points. If it faces the other way, the image is mirrored \
+                 and z of `mount` points into the tool: correct `mount`, and press the corners again"
+            )
+        });
+        return Finding::fine(format!("all four corners are where they should be{confirm}"));
     }
     let order = device.order().map(|old| Symmetry::of_turns(&old).then(symmetry.inverse()).turns());
     let order = order.map(|turns| paste(device, &format!("order = {}", list(&turns))));
     if symmetry.is_mirrored() {
         let way_out = order
             .unwrap_or_else(|| format!("The device `{}` has no turns: correct the layout of its tactels", device.kind));
-        return Finding::problem(format!(
-            "{fault}: the image is mirrored, so the control of a contact becomes positive feedback. No mount mends this. \
-             {way_out}"
-        ));
+        return Finding::problem(mirrored(device, on_arm, symmetry, &way_out));
     }
-    let Some(mount) = mount else {
+    let Some(OnArm { mount, facing }) = on_arm else {
         let order = order.map_or_else(String::new, |order| format!(". If it is an error: {order}"));
         return Finding::warning(format!(
             "{fault}, against how you held the pad. This is an error only if you know which side is x; the image is not \
@@ -75,13 +90,28 @@ pub(super) fn judge(device: &Described, mount: Option<&Mount>, shape: &ImageShap
     let turned = turned(mount, symmetry);
     let mount = format!("If the pad is turned on the arm: {}", paste(device, &turned));
     let order = order.map_or_else(String::new, |order| format!("If the order of its tactels is wrong: {order}\n  "));
-    Finding::problem(format!("{fault}.\n  {order}{mount}"))
+    Finding::problem(format!(
+        "{fault}.\n  {order}{mount}.\n  Both hold only if the pad faces {facing}, where z of its `mount` points"
+    ))
+}
+
+/// Describes a mirrored image, and the mount that looks like one.
+fn mirrored(device: &Described, on_arm: Option<&OnArm>, symmetry: Symmetry, way_out: &str) -> String {
+    const MIRRORED: &str = "the image is mirrored, so the control of a contact becomes positive feedback, and no `mount` \
+                            corrects it";
+    let fault = symmetry.fault();
+    let Some(OnArm { mount, facing }) = on_arm else { return format!("{fault}: {MIRRORED}. {way_out}") };
+    let turned = paste(device, &turned(mount, symmetry));
+    format!(
+        "{fault}. By the `mount` of the bench, z of the pad points to {facing}.\n  If the pad faces there: {MIRRORED}. \
+         {way_out}.\n  If it faces the other way: z of `mount` points into the tool. {turned}"
+    )
 }
 
 /// Returns where a touch is, in halves of the pad from its middle.
-fn in_halves(contact: &Contact, shape: &ImageShape) -> [f64; 2] {
+fn in_halves(spot: &Spot, shape: &ImageShape) -> [f64; 2] {
     let half = [shape.x(shape.cols as f64 - 1.0), shape.y(shape.rows as f64 - 1.0)];
-    [0, 1].map(|axis| contact.centre[axis] / half[axis])
+    [0, 1].map(|axis| spot.centre[axis] / half[axis])
 }
 
 fn nothing_fits(felt: &[[f64; 2]; 4]) -> Finding {
@@ -105,27 +135,26 @@ fn reshaped(device: &Described, shape: &ImageShape, touches: &[Touch; 4]) -> Opt
         return None;
     }
     let exchanged = ImageShape { rows: cols, cols: rows, ..shape.clone() };
-    let contacts: Vec<Contact> = touches
+    let spots: Vec<Spot> = touches
         .iter()
         .map(|touch| {
             let mut frame = vec![0.0; rows * cols];
             grid.places.iter().zip(touch.above.cells()).for_each(|(place, cell)| frame[*place] = *cell);
-            contact(&Image::from_cells(rows, &frame), &exchanged)
+            spot(&Image::from_cells(rows, &frame), &exchanged)
         })
         .collect::<Option<_>>()?;
-    let spread: f64 = contacts.iter().map(|contact| contact.spread).sum();
-    let before: f64 = touches.iter().map(|touch| touch.contact.spread).sum();
-    let felt: [[f64; 2]; 4] = std::array::from_fn(|i| in_halves(&contacts[i], &exchanged));
+    let spread: f64 = spots.iter().map(|spot| spot.spread).sum();
+    let before: f64 = touches.iter().map(|touch| touch.spot.spread).sum();
+    let felt: [[f64; 2]; 4] = std::array::from_fn(|i| in_halves(&spots[i], &exchanged));
     let symmetry = Symmetry::of(&felt).filter(|_| spread < CLEARLY_LESS * before)?;
     sizes.swap(0, 1);
     Some((format!("{sizes:?}"), symmetry.inverse().turns()))
 }
 
-/// Returns the mount that explains a rotation of the image, as a line.
+/// Returns the mount with which an image that a symmetry maps is right, as a line. z turns around if the symmetry mirrors.
 fn turned(mount: &Mount, symmetry: Symmetry) -> String {
-    let rotation = mount.pose().rotation * pose_of([0.0; 3], [0.0, 0.0, -symmetry.angle()]).rotation;
-    let (roll, pitch, yaw) = rotation.euler_angles();
-    format!("mount = {{ xyz = {}, rpy = {} }}", rounded(&mount.xyz), rounded(&[roll, pitch, yaw]))
+    let rotation = mount.pose().rotation * symmetry.inverse().rotation();
+    format!("mount = {{ xyz = {}, rpy = {} }}", rounded(&mount.xyz), rounded(&rpy_of(&rotation)))
 }
 
 /// Writes numbers with at most five decimals.
@@ -157,7 +186,9 @@ mod tests {
         Described { name: "skin".into(), kind: kind.into(), params: params.parse().expect("TOML") }
     }
 
-    const LEVEL: Mount = Mount { xyz: [0.0, 0.0, 0.03], rpy: [0.0; 3] };
+    fn level() -> OnArm {
+        OnArm { mount: Mount { xyz: [0.0, 0.0, 0.03], rpy: [0.0; 3] }, facing: "-z of the base of `arm`".into() }
+    }
 
     /// Touches of two by two tactels in the corners, in an image of which the grid says where the cells of the frame are.
     /// Cell k of the frame is really in row k / cols and column k % cols.
@@ -174,22 +205,22 @@ mod tests {
             }
             let cells: Vec<f32> = grid.places.iter().map(|place| frame[*place]).collect();
             let above = Image::from_cells(grid.cols, &cells);
-            Touch { contact: contact(&above, &shape).expect("it is pressed"), above }
+            Touch { spot: spot(&above, &shape).expect("it is pressed"), above }
         };
         let touches = CORNERS.map(touch);
         (shape, touches)
     }
 
-    fn judged(device: &Described, mount: Option<Mount>, truth: &Grid, grid: &Grid) -> Finding {
+    fn judged(device: &Described, on_arm: Option<OnArm>, truth: &Grid, grid: &Grid) -> Finding {
         let (shape, touches) = touches(truth, grid);
-        judge(device, mount.as_ref(), &shape, &touches)
+        judge(device, on_arm.as_ref(), &shape, &touches)
     }
 
     #[test]
     fn a_mirrored_image_needs_an_order_that_replaces_the_old_one() {
         let truth = Grid::new(6, 8);
         let device = described("stream", "shape = [6, 8]\norder = [\"flip_x\"]");
-        let finding = judged(&device, Some(LEVEL), &truth, &Grid::new(6, 8).turned(Turn::FlipX));
+        let finding = judged(&device, Some(level()), &truth, &Grid::new(6, 8).turned(Turn::FlipX));
         assert_eq!(finding.severity, Severity::Problem);
         assert!(finding.text.starts_with("x is flipped") && finding.text.contains("`order = []`"), "{}", finding.text);
         let device = described("stream", "shape = [6, 8]");
@@ -203,12 +234,42 @@ mod tests {
         assert_eq!(judged(&device, None, &truth, &truth).severity, Severity::Fine);
     }
 
+    /// A mount whose z points into the tool, with a right image: the pad is really turned by half a turn about x.
+    #[test]
+    fn a_mount_that_points_inward_looks_mirrored_and_has_its_own_line() {
+        let truth = Grid::new(6, 8);
+        let device = described("stream", "shape = [6, 8]");
+        let finding = judged(&device, Some(level()), &truth, &truth.clone().turned(Turn::FlipY));
+        assert_eq!(finding.severity, Severity::Problem);
+        for text in [
+            "y is flipped. By the `mount` of the bench, z of the pad points to -z of the base of `arm`",
+            "If the pad faces there: the image is mirrored",
+            "`order = [\"flip_y\"]`",
+            "If it faces the other way: z of `mount` points into the tool",
+            "`mount = { xyz = [0.0, 0.0, 0.03], rpy = [3.14159, 0.0, 0.0] }`",
+        ] {
+            assert!(finding.text.contains(text), "{text}: {finding:?}");
+        }
+    }
+
+    /// A mirrored image and a mount that points inward cancel out, so a right result names what the person must see.
+    #[test]
+    fn what_looks_right_in_the_base_is_right_only_if_the_pad_faces_that_way() {
+        let truth = Grid::new(6, 8);
+        let device = described("stream", "shape = [6, 8]");
+        let finding = judged(&device, Some(level()), &truth, &truth);
+        assert_eq!(finding.severity, Severity::Fine);
+        assert!(finding.text.contains("if the pad faces -z of the base of `arm`"), "{finding:?}");
+        let own = judged(&device, None, &truth, &truth);
+        assert_eq!(own.text, "all four corners are where they should be");
+    }
+
     #[test]
     fn a_turned_image_can_be_an_error_of_the_mount() {
         let square = Grid::new(6, 6);
         let device = described("stream", "shape = [6, 6]");
         let turned = square.clone().turned(Turn::Rot90);
-        let finding = judged(&device, Some(LEVEL), &square, &turned);
+        let finding = judged(&device, Some(level()), &square, &turned);
         assert!(finding.text.starts_with("the image is turned by 90° counterclockwise"), "{finding:?}");
         assert!(
             finding.text.contains("`mount = { xyz = [0.0, 0.0, 0.03], rpy = [0.0, 0.0, -1.5708] }`"),

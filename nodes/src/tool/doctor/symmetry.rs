@@ -1,5 +1,7 @@
 //! The symmetry between where the corners of a pad are and where they are felt.
 
+use nalgebra::{Matrix3, Rotation3};
+
 use crate::devices::stream::Turn;
 
 /// The corners of a pad as the signs of their x and y, counterclockwise.
@@ -54,10 +56,11 @@ impl Symmetry {
         a * d - b * c < 0
     }
 
-    /// Returns the angle of a rotation from x toward y [rad].
-    pub(super) fn angle(self) -> f64 {
-        let [cosine, sine] = [self.0[0][0], self.0[1][0]].map(f64::from);
-        libm::atan2(sine, cosine)
+    /// Returns the rotation that maps x and y in the same way. It turns z around if the symmetry mirrors.
+    pub(super) fn rotation(self) -> Rotation3<f64> {
+        let Self([[a, b], [c, d]]) = self;
+        let [xx, xy, yx, yy, zz] = [a, b, c, d, a * d - b * c].map(f64::from);
+        Rotation3::from_matrix_unchecked(Matrix3::new(xx, xy, 0.0, yx, yy, 0.0, 0.0, 0.0, zz))
     }
 
     /// Returns what a turn of an image does.
@@ -187,6 +190,9 @@ mod tests {
         for (symmetry, fault, is_mirrored) in cases {
             assert_eq!((symmetry.fault(), symmetry.is_mirrored()), (fault, is_mirrored), "{symmetry:?}");
         }
-        assert!((of(&[Turn::Rot90]).angle() - std::f64::consts::FRAC_PI_2).abs() < 1e-15);
+        let quarter = Rotation3::from_axis_angle(&nalgebra::Vector3::z_axis(), std::f64::consts::FRAC_PI_2);
+        assert!((of(&[Turn::Rot90]).rotation().matrix() - quarter.matrix()).norm() < 1e-15);
+        let half = Rotation3::from_axis_angle(&nalgebra::Vector3::x_axis(), std::f64::consts::PI);
+        assert!((of(&[Turn::FlipY]).rotation().matrix() - half.matrix()).norm() < 1e-15, "z turns around");
     }
 }

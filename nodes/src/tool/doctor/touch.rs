@@ -17,7 +17,7 @@ const RELEASED: f64 = 0.25;
 
 /// A place where a pad is pressed.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Contact {
+pub(super) struct Spot {
     /// Centre along the sensor's x and y, from the middle of the pad [m].
     pub(super) centre: [f64; 2],
     /// Sum of the variances along x and y [m²].
@@ -25,7 +25,7 @@ pub(super) struct Contact {
 }
 
 /// Returns where an image above the unloaded one shows a touch; `None` if no tactel is above 0.
-pub(super) fn contact(above: &Image, shape: &ImageShape) -> Option<Contact> {
+pub(super) fn spot(above: &Image, shape: &ImageShape) -> Option<Spot> {
     let edge = EDGE * f64::from(peak(above));
     let mut region = Mask::empty(shape.rows, shape.cols);
     for (k, cell) in above.cells().iter().enumerate().filter(|(_, cell)| **cell > 0.0) {
@@ -34,7 +34,7 @@ pub(super) fn contact(above: &Image, shape: &ImageShape) -> Option<Contact> {
         }
     }
     let sums = Weighing::Force.add_up(above, &region);
-    Some(Contact { centre: sums.centre(shape)?, spread: ellipse(&sums, shape.pitch).spread() })
+    Some(Spot { centre: sums.centre(shape)?, spread: ellipse(&sums, shape.pitch).spread() })
 }
 
 fn peak(image: &Image) -> f32 {
@@ -44,7 +44,7 @@ fn peak(image: &Image) -> f32 {
 /// A touch that has been felt.
 #[derive(Debug, Clone)]
 pub(super) struct Touch {
-    pub(super) contact: Contact,
+    pub(super) spot: Spot,
     /// The mean image above the unloaded one.
     pub(super) above: Image,
 }
@@ -107,11 +107,11 @@ impl Feeler {
         self.lowest = above.cells().iter().fold(self.lowest, |lowest, cell| lowest.min(f64::from(*cell)));
         match self.held {
             None if highest > self.threshold => {
-                let centre = contact(&above, &self.shape)?.centre;
+                let centre = spot(&above, &self.shape)?.centre;
                 let mean = self.steady(&above, centre, now)?;
-                let contact = contact(&mean, &self.shape)?;
+                let spot = spot(&mean, &self.shape)?;
                 self.held = Some(f64::from(peak(&mean)));
-                Some(Event::Touched(Touch { contact, above: mean }))
+                Some(Event::Touched(Touch { spot, above: mean }))
             }
             Some(held) if highest <= self.threshold.max(RELEASED * held) => {
                 // What the foam still shows is the new zero.
@@ -184,9 +184,9 @@ mod tests {
         };
         assert!((now - 2.3).abs() < 0.021, "{now} s");
         // The middle of columns 4 and 5 of 6, and row 0 of 4, 2 mm apart.
-        let [x, y] = touch.contact.centre;
+        let [x, y] = touch.spot.centre;
         assert!((x - 0.004).abs() < 1e-12 && (y + 0.003).abs() < 1e-12, "{x}, {y}");
-        assert!((touch.contact.spread - 1e-6).abs() < 1e-15, "two tactels, 1 mm from their middle");
+        assert!((touch.spot.spread - 1e-6).abs() < 1e-15, "two tactels, 1 mm from their middle");
         assert!(keep(&mut feeler, &image(0, 50.0), 4.0, 2.0).is_none(), "it is felt once");
         // The foam has not recovered: a rest of 6 stays, and it is no touch afterwards.
         let (_, event) = keep(&mut feeler, &image(0, 6.0), 6.0, 1.0).expect("it is released");

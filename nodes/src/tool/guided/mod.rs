@@ -3,6 +3,7 @@
 
 mod arm;
 mod bench_file;
+pub(super) mod mount;
 
 use std::io::BufRead;
 use std::path::Path;

@@ -6,7 +6,7 @@ use nalgebra::{IsometryMatrix3, Vector3};
 use tactflow_runtime::graph::{OpenBench, open_bench};
 use tactflow_runtime::signal::{Joints, Shape};
 
-use super::super::guided::{BoundRole, GuidedArm, GuidedCell};
+use super::super::guided::{BoundRole, GuidedArm, GuidedCell, mount};
 use crate::motion::pose::pose_of;
 
 /// An arm of a bench, and the point on it that touches.
@@ -87,9 +87,8 @@ fn pads(cell: &GuidedCell<'_>, path: &Path) -> Result<Vec<Pad>, String> {
     let OpenBench { devices, .. } = bench.map_err(|report| report.render(false))?;
     let pad = |bound: &BoundRole| {
         let device = devices.iter().find(|device| device.name == bound.device)?;
-        let mount = device.opened.description.fact_on(bound.side.as_deref(), "tactile_pad", "mount")?;
-        let part = |name: &str| mount.get(name).and_then(numbers)?.try_into().ok();
-        Some((bound.role.clone(), [part("xyz")?, part("rpy")?]))
+        let mount = mount::stated(&device.opened.description, bound.side.as_deref())?;
+        Some((bound.role.clone(), [mount.xyz, mount.rpy]))
     };
     Ok(cell.bound().iter().filter_map(pad).collect())
 }

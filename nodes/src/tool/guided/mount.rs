@@ -1,0 +1,45 @@
+//! The mount of a pad, as its device states it.
+
+use tactflow_runtime::device::Description;
+
+use crate::arm::mount::Mount;
+
+/// Returns where a pad is on the tip of its arm, or `None` if the device states no `mount` for a pad on that side.
+pub(in crate::tool) fn stated(description: &Description, side: Option<&str>) -> Option<Mount> {
+    parse(description.fact_on(side, "tactile_pad", "mount")?)
+}
+
+fn parse(fact: &toml::Value) -> Option<Mount> {
+    let three = |name: &str| -> Option<[f64; 3]> {
+        fact.get(name)?.as_array()?.iter().map(number).collect::<Option<Vec<_>>>()?.try_into().ok()
+    };
+    Some(Mount { xyz: three("xyz")?, rpy: three("rpy")? })
+}
+
+fn number(value: &toml::Value) -> Option<f64> {
+    value.as_float().or_else(|| value.as_integer().map(|integer| integer as f64))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn parsed(text: &str) -> Option<Mount> {
+        let table: toml::Table = text.parse().expect("TOML");
+        parse(&table["mount"])
+    }
+
+    #[test]
+    fn a_mount_has_three_numbers_for_each_key() {
+        let mount = parsed("mount = { xyz = [0, 0.01, 1e-1], rpy = [0.5, 0, -1] }").expect("it is whole");
+        assert_eq!((mount.xyz, mount.rpy), ([0.0, 0.01, 0.1], [0.5, 0.0, -1.0]));
+        for text in [
+            "mount = { xyz = [0, 0, 0] }",
+            "mount = { xyz = [0, 0], rpy = [0, 0, 0] }",
+            "mount = { xyz = [0, 0, \"1\"], rpy = [0, 0, 0] }",
+            "mount = 3",
+        ] {
+            assert!(parsed(text).is_none(), "{text}");
+        }
+    }
+}
