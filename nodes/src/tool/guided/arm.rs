@@ -50,6 +50,11 @@ impl GuidedArm {
         Ok(Self { bound, position, chain })
     }
 
+    /// Returns the joints of the model.
+    pub(crate) fn joints(&self) -> &[Joint] {
+        self.chain.joints()
+    }
+
     /// Returns the pose of the tip in the base [m].
     pub(crate) fn tip(&self, joints: &[f64]) -> IsometryMatrix3<f64> {
         self.chain.forward(joints, &mut vec![Twist::default(); joints.len()]).0

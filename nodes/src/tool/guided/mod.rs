@@ -4,6 +4,7 @@
 mod arm;
 mod bench_file;
 pub(super) mod mount;
+mod temporary;
 
 use std::io::BufRead;
 use std::path::Path;
@@ -18,7 +19,7 @@ use tactflow_runtime::graph::{BenchDevice, OpenBench, open_bench};
 use tactflow_runtime::signal::Signal;
 
 pub(super) use arm::{GuidedArm, StillPosture, chain};
-pub(super) use bench_file::{BenchFile, numbers};
+pub(super) use bench_file::{BenchFile, joint_numbers, numbers};
 
 /// Longest time between two looks at the devices, which wake the thread when they sample.
 const LOOK: Duration = Duration::from_millis(1);
@@ -204,7 +205,8 @@ impl<'s> GuidedCell<'s> {
         }
     }
 
-    /// Prints the changes of a bench file and writes them after a typed `yes`. Returns the exit code.
+    /// Prints the changes of a bench file and writes them after a typed `yes`. Changes with which the bench does not load
+    /// are refused without a question. Returns the exit code.
     ///
     /// # Errors
     /// If the dialogue ends first.
@@ -214,6 +216,11 @@ impl<'s> GuidedCell<'s> {
             return Ok(0);
         }
         let (path, changes) = (bench.path().display(), bench.changes());
+        if let Err(why) = bench.check(self.shell.catalogue()) {
+            self.shell.say(&format!("\n{changes}\n"));
+            self.shell.error(why);
+            return Ok(FAULTED);
+        }
         let answer = self.ask(&format!("\n{changes}\n\nType `yes` to write these lines into {path}:"))?;
         if answer != "yes" {
             self.shell.say("nothing is written");

@@ -5,7 +5,7 @@ use tactflow_runtime::device::Description;
 use crate::arm::mount::Mount;
 
 /// Returns where a pad is on the tip of its arm, or `None` if the device states no `mount` for a pad on that side.
-pub(in crate::tool) fn stated(description: &Description, side: Option<&str>) -> Option<Mount> {
+pub(crate) fn stated(description: &Description, side: Option<&str>) -> Option<Mount> {
     parse(description.fact_on(side, "tactile_pad", "mount")?)
 }
 

@@ -3,9 +3,9 @@
 use nalgebra::Vector3;
 use toml_edit::{Array, Value};
 
-use super::super::guided::{BenchFile, GuidedCell, Left, StillPosture, numbers};
+use super::super::guided::{BenchFile, GuidedCell, Left, StillPosture, joint_numbers, numbers};
 use super::Step;
-use super::plane::{FreeSide, fit, room};
+use super::plane::{FreeSide, fit};
 use super::site::Site;
 use super::workspace::Workspace;
 
@@ -27,8 +27,16 @@ pub(super) struct Taught {
     home: Option<Vec<f64>>,
     start: Option<Vec<f64>>,
     workspace: Option<Workspace>,
-    /// The rows of `keep_out`, with those that stay; `None` if no plane was taught.
-    keep_out: Option<Vec<[f64; 4]>>,
+    planes: Option<Planes>,
+}
+
+/// Planes that were taught.
+#[derive(Debug)]
+struct Planes {
+    /// The new rows of `keep_out`.
+    rows: Vec<[f64; 4]>,
+    /// Whether the rows that the bench states stay.
+    keeps: bool,
 }
 
 impl Taught {
@@ -39,16 +47,21 @@ impl Taught {
     pub(super) fn write_into(&self, mut file: BenchFile, site: &Site) -> Result<BenchFile, String> {
         let device = ["devices", site.arm.bound.device.as_str()];
         for (key, joints) in [("home", &self.home), ("start", &self.start)] {
-            joints.as_ref().map_or(Ok(()), |joints| file.set(&device, key, numbers(joints, 4)))?;
+            joints
+                .as_ref()
+                .map_or(Ok(()), |joints| file.set(&device, key, joint_numbers(joints, site.arm.joints(), 4)))?;
         }
         let limits: Vec<&str> = site.limits.iter().map(String::as_str).collect();
         if let Some(Workspace { min, max }) = self.workspace {
             file.set(&limits, "workspace_min_m", numbers(&min, 4))?;
             file.set(&limits, "workspace_max_m", numbers(&max, 4))?;
         }
-        if let Some(rows) = &self.keep_out {
+        if let Some(Planes { rows, keeps }) = &self.planes {
             let rows: Array = rows.iter().map(|row| Value::Array(numbers(row, 6))).collect();
-            file.set(&limits, "keep_out", rows)?;
+            match keeps {
+                true => file.extend(&limits, "keep_out", rows)?,
+                false => file.set(&limits, "keep_out", rows)?,
+            }
         }
         Ok(file)
     }
@@ -79,6 +92,12 @@ impl<'d, 's> Dialogue<'d, 's> {
             "Nothing is sent to `{}`. Guide it by hand: gravity compensation or freedrive.\nPoints are those of {}.",
             self.site.arm.bound.role, self.site.point
         ));
+        if self.site.pads_of_one_arm > 1 {
+            self.say(
+                "The bench has several pads. A task with two pads on this arm keeps only the origin of its first pad in the \
+                 workspace and before the planes: touch with that pad.",
+            );
+        }
         for step in steps {
             match step {
                 Step::Home => {
@@ -88,7 +107,7 @@ impl<'d, 's> Dialogue<'d, 's> {
                     self.taught.start = self.posture("start: guide the arm to the posture from which runs begin")?;
                 }
                 Step::Workspace => self.taught.workspace = self.workspace()?,
-                Step::KeepOut => self.taught.keep_out = self.planes()?,
+                Step::KeepOut => self.taught.planes = self.planes()?,
             }
         }
         self.warn_of_postures();
@@ -158,15 +177,17 @@ impl<'d, 's> Dialogue<'d, 's> {
         let question = "\nworkspace: visit corners and bounds of it, two points or more. Enter adds a point, `done` ends, \
                         `s` skips.";
         let found = self.points(question, |points| Workspace::around(points, margin))?;
-        if let Some(Workspace { min, max }) = found {
+        if let Some(found @ Workspace { min, max }) = found {
             let size: Vec<String> = (0..3).map(|axis| format!("{:.0}", (max[axis] - min[axis]) * 1e3)).collect();
             self.say(&format!("  the box is {} mm", size.join(" x ")));
+            let narrowed = self.site.general.as_ref().map(|limits| found.narrowed_by(limits)).unwrap_or_default();
+            narrowed.iter().for_each(|text| self.say(&format!("warning: {text}")));
         }
         Ok(found)
     }
 
-    /// Asks for planes until one is skipped. Returns the rows of all, with those of the bench that stay.
-    fn planes(&mut self) -> Result<Option<Vec<[f64; 4]>>, Left> {
+    /// Asks for planes until one is skipped.
+    fn planes(&mut self) -> Result<Option<Planes>, Left> {
         let mut rows = Vec::new();
         loop {
             let question = format!(
@@ -186,20 +207,21 @@ impl<'d, 's> Dialogue<'d, 's> {
         if rows.is_empty() {
             return Ok(None);
         }
-        let mut all = if self.keeps_rows()? { self.site.rows.clone() } else { Vec::new() };
-        all.extend(rows);
-        Ok(Some(all))
+        let keeps = self.keeps_rows()?;
+        Ok(Some(Planes { rows, keeps }))
     }
 
     /// Returns the plane with its free side: that of home, or else of the start, or else of a posture that is asked for.
+    /// A posture of the robot file was not chosen for this cell, so it shows no side.
     fn free_side(&mut self, facing: impl Fn(&Vector3<f64>) -> Option<FreeSide>) -> Result<Option<FreeSide>, Left> {
-        let known = [self.known_home(), self.known_start()];
-        let names = ["home", "the start"].into_iter().zip(known);
-        for (name, joints) in names {
+        let [home, start] = self.site.is_stated;
+        let home = self.taught.home.clone().or_else(|| self.site.home.clone().filter(|_| home));
+        let start = self.taught.start.clone().or_else(|| self.site.start.clone().filter(|_| start));
+        for (name, joints) in [("home", home), ("the start", start)] {
             let side = joints.and_then(|joints| facing(&self.site.point_at(&joints)));
-            if side.is_some() {
-                self.say(&format!("  the side of {name} is free"));
-                return Ok(side);
+            if let Some(side) = side {
+                self.say(&format!("  the side of {name} is free: {} of the base", side.direction()));
+                return Ok(Some(side));
             }
         }
         loop {
@@ -207,7 +229,10 @@ impl<'d, 's> Dialogue<'d, 's> {
                 "  guide the arm to the free side, 10 mm or more from the plane. Enter measures, `s` drops the plane:";
             let Answer::Posture(posture) = self.answer(question, false)? else { return Ok(None) };
             match facing(&self.site.point_of(&posture.tip)) {
-                Some(side) => return Ok(Some(side)),
+                Some(side) => {
+                    self.say(&format!("  this side is free: {} of the base", side.direction()));
+                    return Ok(Some(side));
+                }
                 None => self.say("  this is nearer than 10 mm to the plane"),
             }
         }
@@ -216,6 +241,13 @@ impl<'d, 's> Dialogue<'d, 's> {
     /// Asks whether the planes that the bench states stay.
     fn keeps_rows(&mut self) -> Result<bool, Left> {
         let count = self.site.rows.len();
+        let general =
+            self.site.general.as_ref().and_then(|limits| limits.get("keep_out")?.as_array()).map_or(0, Vec::len);
+        if general > 0 {
+            self.say(&format!(
+                "\n`keep_out` of `[limits]` has rows for all arms: {general}. They stay, also after `replace`."
+            ));
+        }
         if count == 0 {
             return Ok(true);
         }
@@ -244,10 +276,19 @@ impl<'d, 's> Dialogue<'d, 's> {
             if let Some(why) = self.taught.workspace.and_then(|workspace| workspace.outside(&point)) {
                 self.say(&format!("warning: `{name}` is outside of the workspace: {why}"));
             }
-            for row in self.taught.keep_out.iter().flatten().filter(|row| room(**row, &point) < 0.0) {
-                let behind = -room(*row, &point) * 1e3;
-                self.say(&format!("warning: `{name}` is {behind:.1} mm behind the plane {row:.4?}"));
+            for row in self.all_rows() {
+                let height = FreeSide::of_row(row).height(&point);
+                if height < 0.0 {
+                    self.say(&format!("warning: `{name}` is {:.1} mm behind the plane {row:.4?}", -height * 1e3));
+                }
             }
         }
+    }
+
+    /// Returns the rows of `keep_out` that hold for this arm, if planes were taught.
+    fn all_rows(&self) -> Vec<[f64; 4]> {
+        let Some(Planes { rows, keeps }) = &self.taught.planes else { return Vec::new() };
+        let kept = self.site.rows.iter().filter(|_| *keeps);
+        kept.chain(rows).copied().collect()
     }
 }

@@ -30,10 +30,15 @@ freedrive. Each question names the step:
 - start      the posture from which runs begin: `start` of its device
 - workspace  two points or more; the box around them: `workspace_min_m` and `workspace_max_m` of [limits]
 - keep-out   three points or more on each table, wall or fixture: rows of `keep_out` of [limits]. The side on which
-             home is, or else the start, is free; otherwise one more posture shows the free side
+             home is, or else the start, is free, if it was taught or the bench states it; otherwise one more posture
+             shows the free side
 
 A point is the origin of the pad, through its `mount`; without a pad it is the tip of the arm. At the end, the lines are
-printed and written into the bench after a typed `yes`. Comments in the bench stay.
+printed and written into the bench after a typed `yes`. Comments in the bench stay. Lines with which the bench does not
+load are not written.
+
+With two pads on one arm, the workspace and the planes bound the origin of the first pad of the task, not that of the
+second one: touch with the first pad.
 
 Examples:
   tactflow teach cell.toml
@@ -52,7 +57,7 @@ pub(super) struct TeachArgs {
     /// Role of the arm, if the bench binds several; its limits are written under [limits.ROLE] then
     #[arg(long, value_name = "ROLE")]
     arm: Option<String>,
-    /// Role of the pad whose origin touches the points, if the bench binds several; `none` for the tip of the arm
+    /// Role of the pad whose origin touches the points, if the bench binds several pads or arms; `none` for the tip
     #[arg(long, value_name = "ROLE")]
     sensor: Option<String>,
     /// Room of the box around the visited points on each side; negative for a smaller box [mm]

@@ -6,6 +6,8 @@ use nalgebra::{Matrix3, SymmetricEigen, Vector3};
 pub(super) const MIN_WIDTH_M: f64 = 0.02;
 /// Smallest distance of a posture from a plane at which it shows the free side [m].
 const MIN_FREE_M: f64 = 0.01;
+/// Component of a normal along an axis from which on the axis names the direction.
+const MIN_ALONG: f64 = 0.99;
 
 /// A plane of which the free side is not known: n·p = d.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -56,24 +58,40 @@ pub(super) fn fit(points: &[Vector3<f64>]) -> Result<Fit, String> {
 impl Fit {
     /// Returns the plane with the side of a point as the free one, or `None` if the point is too near to the plane.
     pub(super) fn facing(&self, free: &Vector3<f64>) -> Option<FreeSide> {
-        let height = self.normal.dot(free) - self.distance;
+        let height = FreeSide { normal: self.normal, distance: self.distance }.height(free);
         let sign = height.signum();
         (height.abs() >= MIN_FREE_M).then_some(FreeSide { normal: self.normal * sign, distance: self.distance * sign })
     }
 }
 
 impl FreeSide {
+    /// Returns the plane of a row of `keep_out`.
+    pub(super) fn of_row([x, y, z, distance]: [f64; 4]) -> Self {
+        Self { normal: Vector3::new(x, y, z), distance }
+    }
+
+    /// Returns the height of a point over the plane; negative behind it [m].
+    pub(super) fn height(&self, point: &Vector3<f64>) -> f64 {
+        self.normal.dot(point) - self.distance
+    }
+
+    /// Returns the free direction in words: an axis of the base, or a unit vector.
+    pub(super) fn direction(&self) -> String {
+        let axis = self.normal.iamax();
+        let along = self.normal[axis];
+        let sign = if along > 0.0 { '+' } else { '-' };
+        match along.abs() > MIN_ALONG {
+            true => format!("{sign}{}", ["x", "y", "z"][axis]),
+            false => format!("[{:.2}, {:.2}, {:.2}]", self.normal.x, self.normal.y, self.normal.z),
+        }
+    }
+
     /// Returns the row of `keep_out` with the plane moved to the free side by a clearance [m]. It is rounded to 0.1 mm.
     pub(super) fn row(&self, clearance: f64) -> [f64; 4] {
         let tenths = ((self.distance + clearance) * 1e4).round() / 1e4;
         let [x, y, z] = self.normal.into();
         [x, y, z, tenths]
     }
-}
-
-/// Returns how far a point is on the free side of a row of `keep_out`; negative behind it [m].
-pub(super) fn room([x, y, z, distance]: [f64; 4], point: &Vector3<f64>) -> f64 {
-    Vector3::new(x, y, z).dot(point) - distance
 }
 
 #[cfg(test)]
@@ -95,6 +113,8 @@ mod tests {
         for (row, wanted) in [(above, [0.0, 0.0, 1.0, 0.125]), (below, [0.0, 0.0, -1.0, -0.115])] {
             assert!(row.iter().zip(wanted).all(|(found, wanted)| (found - wanted).abs() < 1e-9), "{row:?}");
         }
+        assert_eq!([above, below].map(|row| FreeSide::of_row(row).direction()), ["+z", "-z"]);
+        assert_eq!(FreeSide::of_row([0.6, 0.0, -0.8, 0.1]).direction(), "[0.60, 0.00, -0.80]");
         assert_eq!(table.facing(&Vector3::new(0.0, 0.0, 0.125)), None, "5 mm above it");
     }
 
@@ -132,7 +152,7 @@ mod tests {
             let found = Vector3::new(row[0], row[1], row[2]);
             prop_assert!((found - normal * height.signum()).norm() < 1e-9);
             prop_assert!((row[3] - found.dot(&a)).abs() < 5.1e-5 && fit.residual < 1e-12);
-            prop_assert!((room(row, &free) - height.abs()).abs() < 1e-4);
+            prop_assert!((FreeSide::of_row(row).height(&free) - height.abs()).abs() < 1e-4);
         }
     }
 }

@@ -1,10 +1,12 @@
 //! What is taught: an arm of a bench, the point on it that touches, and what the bench states already.
 
+use std::collections::BTreeSet;
 use std::path::Path;
 
 use nalgebra::{IsometryMatrix3, Vector3};
 use tactflow_runtime::graph::{OpenBench, open_bench};
 use tactflow_runtime::signal::{Joints, Shape};
+use toml::Value;
 
 use super::super::guided::{BoundRole, GuidedArm, GuidedCell, mount};
 use crate::motion::pose::pose_of;
@@ -18,11 +20,17 @@ pub(super) struct Site {
     pub(super) point: String,
     /// Section of the limits of this arm: `limits`, and the role if the bench binds several arms.
     pub(super) limits: Vec<String>,
-    /// Postures that the bench states [rad].
+    /// Postures of the device, perhaps of its robot file [rad].
     pub(super) home: Option<Vec<f64>>,
     pub(super) start: Option<Vec<f64>>,
-    /// Rows of `keep_out` that the bench states for this arm.
+    /// Whether the bench itself states home and the start.
+    pub(super) is_stated: [bool; 2],
+    /// Rows of `keep_out` that the bench states in the section of this arm.
     pub(super) rows: Vec<[f64; 4]>,
+    /// The section `[limits]` if this arm has one of its own: it holds too.
+    pub(super) general: Option<Value>,
+    /// Number of pads of the bench, if it has one arm.
+    pub(super) pads_of_one_arm: usize,
 }
 
 /// A pad that a bench binds: its role, and the origin and the angles of its mount [m, rad].
@@ -47,22 +55,27 @@ impl Site {
                 "device `{device}` has several sides, and their postures cannot be written by `teach`: write them by hand"
             ));
         }
-        let home = description.fact_on(None, "velocity_arm", "home").and_then(numbers);
+        let home = description.fact_on(None, "velocity_arm", "home").and_then(read_numbers);
         let start = match description.shape("position") {
             Some(Shape::Joints(shape)) => shape.joints.iter().map(|joint| joint.start).collect(),
             _ => None,
         };
-        let arms = cell.bound().iter().filter(|bound| cell.port::<Joints>(bound, "position").is_some()).count();
+        let arms = arms(cell);
         let mut limits = vec!["limits".to_owned()];
         limits.extend((arms > 1).then(|| role.clone()));
-        let (mount, point) = match pad(pads(cell, path)?, sensor)? {
+        let pads = pads(cell, path)?;
+        let pads_of_one_arm = if arms > 1 { 0 } else { pads.len() };
+        let (mount, point) = match pad(pads, sensor, arms)? {
             Some((pad, [xyz, rpy])) => {
                 (pose_of(xyz, rpy), format!("the origin of `{pad}`, which is at {xyz:?} m on the tip of `{role}`"))
             }
             None => (IsometryMatrix3::identity(), format!("the tip of `{role}`")),
         };
-        let rows = rows(path, &limits)?;
-        Ok(Self { arm: found, mount, point, limits, home, start, rows })
+        let text = bench(path)?;
+        let rows = rows(&text, &limits)?;
+        let is_stated = ["home", "start"].map(|key| section(&text, &["devices", device, key]).is_some());
+        let general = (arms > 1).then(|| section(&text, &["limits"]).cloned()).flatten();
+        Ok(Self { arm: found, mount, point, limits, home, start, is_stated, rows, general, pads_of_one_arm })
     }
 
     /// Returns the touching point of a pose of the tip [m].
@@ -76,8 +89,16 @@ impl Site {
     }
 }
 
-fn numbers(value: &toml::Value) -> Option<Vec<f64>> {
-    let number = |value: &toml::Value| value.as_float().or_else(|| value.as_integer().map(|number| number as f64));
+/// Counts the arms of a cell. A device that fills several roles is one arm.
+fn arms(cell: &GuidedCell<'_>) -> usize {
+    let is_arm = |bound: &&BoundRole| cell.port::<Joints>(bound, "position").is_some();
+    let arms = cell.bound().iter().filter(is_arm).map(|BoundRole { device, side, .. }| (device, side));
+    arms.collect::<BTreeSet<_>>().len()
+}
+
+/// Reads a list of plain numbers.
+pub(super) fn read_numbers(value: &Value) -> Option<Vec<f64>> {
+    let number = |value: &Value| value.as_float().or_else(|| value.as_integer().map(|number| number as f64));
     value.as_array()?.iter().map(number).collect()
 }
 
@@ -93,8 +114,8 @@ fn pads(cell: &GuidedCell<'_>, path: &Path) -> Result<Vec<Pad>, String> {
     Ok(cell.bound().iter().filter_map(pad).collect())
 }
 
-/// Returns the pad of the role `wanted`, or the only one; `None` without a pad.
-fn pad(pads: Vec<Pad>, wanted: Option<&str>) -> Result<Option<Pad>, String> {
+/// Returns the pad of the role `wanted`, or the only one if there is one arm; `None` without a pad.
+fn pad(pads: Vec<Pad>, wanted: Option<&str>, arms: usize) -> Result<Option<Pad>, String> {
     let names = || pads.iter().map(|(role, _)| format!("`{role}`")).collect::<Vec<_>>().join(", ");
     match wanted {
         Some("none") => Ok(None),
@@ -109,20 +130,34 @@ fn pad(pads: Vec<Pad>, wanted: Option<&str>) -> Result<Option<Pad>, String> {
             "the bench binds several pads: name the one that touches with `--sensor`, one of {}, or `none` for the tip",
             names()
         )),
+        None if arms > 1 && !pads.is_empty() => Err(format!(
+            "the bench binds several arms, and does not state which of them carries the pad {}: add `--sensor {}` if it is \
+             on this arm, or `--sensor none` for the tip",
+            names(),
+            pads[0].0
+        )),
         None => Ok(pads.into_iter().next()),
     }
 }
 
-/// Returns the rows of `keep_out` in a section of a bench file.
-fn rows(path: &Path, section: &[String]) -> Result<Vec<[f64; 4]>, String> {
+/// Reads the tables of a bench file.
+fn bench(path: &Path) -> Result<Value, String> {
     let fail = |error: &dyn std::fmt::Display| format!("cannot read `{}`: {error}", path.display());
     let text = std::fs::read_to_string(path).map_err(|error| fail(&error))?;
-    let root: toml::Value = toml::from_str(&text).map_err(|error| fail(&error))?;
-    let found = section.iter().try_fold(&root, |value, name| value.get(name)).and_then(|limits| limits.get("keep_out"));
-    let Some(rows) = found.and_then(toml::Value::as_array) else { return Ok(Vec::new()) };
-    let read = |row: &toml::Value| {
+    toml::from_str(&text).map_err(|error| fail(&error))
+}
+
+fn section<'v>(root: &'v Value, names: &[&str]) -> Option<&'v Value> {
+    names.iter().try_fold(root, |value, name| value.get(name))
+}
+
+/// Returns the rows of `keep_out` in a section of a bench file.
+fn rows(root: &Value, names: &[String]) -> Result<Vec<[f64; 4]>, String> {
+    let found = names.iter().try_fold(root, |value, name| value.get(name)).and_then(|limits| limits.get("keep_out"));
+    let Some(rows) = found.and_then(Value::as_array) else { return Ok(Vec::new()) };
+    let read = |row: &Value| {
         let message = "a row of `keep_out` is not four plain numbers, so it cannot be kept: write it without units";
-        numbers(row).and_then(|row| row.try_into().ok()).ok_or_else(|| message.to_owned())
+        read_numbers(row).and_then(|row| row.try_into().ok()).ok_or_else(|| message.to_owned())
     };
     rows.iter().map(read).collect()
 }

@@ -1,6 +1,9 @@
 //! A box around visited points.
 
 use nalgebra::Vector3;
+use toml::Value;
+
+use super::site::read_numbers;
 
 /// Smallest side of a taught box [m].
 const MIN_SIDE_M: f64 = 0.01;
@@ -39,6 +42,26 @@ impl Workspace {
         }
     }
 
+    /// Returns in words where the box of a section `[limits]`, which holds too, leaves less than this one.
+    pub(super) fn narrowed_by(&self, limits: &Value) -> Vec<String> {
+        let corner = |key: &str| limits.get(key).map(|value| (key.to_owned(), read_numbers(value)));
+        let low = corner("workspace_min_m").map(|(key, corner)| (key, corner, true));
+        let high = corner("workspace_max_m").map(|(key, corner)| (key, corner, false));
+        low.into_iter().chain(high).filter_map(|(key, corner, is_min)| self.narrowed(&key, corner?, is_min)).collect()
+    }
+
+    fn narrowed(&self, key: &str, corner: Vec<f64>, is_min: bool) -> Option<String> {
+        let (near, far) = if is_min { (self.min, self.max) } else { (self.max, self.min) };
+        let sign = if is_min { 1.0 } else { -1.0 };
+        let inside =
+            |axis: &usize, bound: &[f64; 3]| corner.get(*axis).is_some_and(|q| (q - bound[*axis]) * sign > 0.0);
+        let is_disjoint = (0..3).any(|axis| inside(&axis, &far));
+        let axes: Vec<&str> = (0..3).filter(|axis| inside(axis, &near)).map(|axis| AXES[axis]).collect();
+        let what = if is_disjoint { "leaves nothing of the taught box" } else { "is tighter than the taught box" };
+        (!axes.is_empty())
+            .then(|| format!("`{key} = {corner:?}` of `[limits]` holds too, and {what}, along {}", axes.join(", ")))
+    }
+
     /// Returns the first coordinate of a point that is outside of the box, in words.
     pub(super) fn outside(&self, point: &Vector3<f64>) -> Option<String> {
         let axis = (0..3).find(|axis| !(self.min[*axis]..=self.max[*axis]).contains(&point[*axis]))?;
@@ -61,6 +84,19 @@ mod tests {
         assert_eq!(found.outside(&points[2]), None);
         let outside = found.outside(&Vector3::new(0.45, 0.3, 0.0)).unwrap();
         assert_eq!(outside, "its y is 0.3000 m, and the box is from -0.2000 to 0.2000 m");
+    }
+
+    #[test]
+    fn tighter_and_disjoint_corners_of_all_arms_are_named() {
+        let found = Workspace { min: [0.0; 3], max: [0.5; 3] };
+        let narrowed = |text: &str| found.narrowed_by(&toml::from_str(text).unwrap());
+        let wide = "workspace_min_m = [-1.0, 0.0, -1.0]\nworkspace_max_m = [1, 1, 0.5]";
+        assert!(narrowed(wide).is_empty() && narrowed("force_n = 5.0").is_empty());
+        let tight = narrowed("workspace_min_m = [0.1, -1.0, 0.2]\nworkspace_max_m = [1.0, -0.1, 1.0]");
+        assert_eq!(tight.len(), 2, "{tight:?}");
+        assert!(tight[0].ends_with("holds too, and is tighter than the taught box, along x, z"), "{tight:?}");
+        assert!(tight[1].starts_with("`workspace_max_m = [1.0, -0.1, 1.0]` of `[limits]`"), "{tight:?}");
+        assert!(tight[1].ends_with("leaves nothing of the taught box, along y"), "{tight:?}");
     }
 
     #[test]
