@@ -64,6 +64,11 @@ fn collect(mut stream: impl Read + Send + 'static, into: &Arc<Mutex<String>>) {
 
 impl Person {
     fn teach(args: &[&str]) -> Self {
+        Self::teach_bench(BENCH, args)
+    }
+
+    /// Teaches a bench whose port is `PORT`.
+    fn teach_bench(bench: &str, args: &[&str]) -> Self {
         let port = UdpSocket::bind("127.0.0.1:0").unwrap().local_addr().unwrap().port();
         let mut peer = Command::new("python3")
             .arg(workspace().join("tests/peers/lwr.py"))
@@ -80,7 +85,7 @@ impl Person {
             }
         });
         let (folder, path) = in_new_folder("cell.toml");
-        let before = BENCH.replace("PORT", &port.to_string());
+        let before = bench.replace("PORT", &port.to_string());
         fs::write(&path, &before).unwrap();
         let mut command = tool(&[&["teach", &path], args].concat());
         let mut child = command.stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
@@ -196,7 +201,7 @@ fn a_cell_is_taught_by_hand_and_loads() {
     let planes = "`s` ends the planes. Point";
     person.measures(&format!("{planes} 4:"), round(0.5));
     person.types(&format!("{planes} 5:"), "done");
-    person.wait(0, &["the side of home is free"]);
+    person.wait(0, &["the side of home is free: "]);
     person.types("keep-out plane 2: touch", "s");
     person.types("`keep_out` of the bench has rows already: 1.", "keep");
     person.types("Type `yes` to write these lines", "yes");
@@ -292,4 +297,59 @@ fn a_bench_without_an_arm_to_guide_is_refused() {
     assert!(said.err.contains("device `bench` runs step by step with a graph, so nobody can guide it"), "{}", said.err);
     let said = say(&["teach", "graphs/benches/lwr_fri.toml", "--only", "nothing"]);
     assert_eq!(said.code, 2, "{}", said.err);
+}
+
+#[test]
+fn an_arm_of_two_roles_is_one_arm_and_comments_in_the_list_stay() {
+    let bench = BENCH.replace("pad = \"pad\"\n", "wrist = \"arm\"\npad = \"pad\"\n").replace(
+        "keep_out = [[1.0, 0.0, 0.0, -0.85]]",
+        "keep_out = [\n  # the wall\n  [1.0, 0.0, 0.0, -0.85], # of brick\n]",
+    );
+    let mut person = Person::teach_bench(&bench, &["--only", "keep-out"]);
+    for (i, turn) in [-0.5, 0.0, 0.5].into_iter().enumerate() {
+        person.measures(&format!("`s` ends the planes. Point {}:", i + 1), round(turn));
+    }
+    person.types("`s` ends the planes. Point 4:", "done");
+    // The home of the robot file was not chosen for this cell.
+    person.measures("guide the arm to the free side", HOME);
+    person.wait(0, &["this side is free: +z of the base", "this side is free: -z of the base"]);
+    person.types("keep-out plane 2: touch", "s");
+    person.types("`keep_out` of the bench has rows already: 1.", "keep");
+    person.types("Type `yes` to write these lines", "yes");
+    person.wait(0, &["wrote "]);
+    let (code, out, after) = person.ends();
+    assert_eq!(code, 0, "{out}");
+    assert!(after.contains("keep_out = [\n  # the wall\n  [1.0, 0.0, 0.0, -0.85], # of brick\n  ["), "{after}");
+    assert!(!after.contains("[limits."), "{after}");
+    assert!(!out.contains("the side of home is free"), "{out}");
+}
+
+#[test]
+fn several_pads_of_one_arm_are_explained() {
+    let bench = BENCH
+        .replace("pad = \"pad\"\n", "pad = \"pad\"\nfingertip = \"tip_pad\"\n")
+        .replace("[limits]", "[devices.tip_pad]\ntype = \"mock_pad\"\n\n[limits]");
+    let mut person = Person::teach_bench(&bench, &["--only", "home", "--sensor", "pad"]);
+    person.wait(0, &["keeps only the origin of its first pad in the workspace and before the planes"]);
+    person.types("home: guide", "s");
+    let (code, out, after) = person.ends();
+    assert_eq!(code, 0, "{out}");
+    assert!(after.contains("tip_pad") && out.contains("nothing was measured"), "{out}");
+}
+
+#[test]
+fn with_several_arms_the_pad_must_be_named() {
+    let ports = [(); 2].map(|()| UdpSocket::bind("127.0.0.1:0").unwrap());
+    let ports = ports.map(|socket| socket.local_addr().unwrap().port().to_string());
+    let second =
+        format!("[devices.other]\ntype = \"lwr_fri\"\nrobot = \"builtin:lwr4p.toml\"\nport = {}\n\n", ports[1]);
+    let bench = BENCH
+        .replace("PORT", &ports[0])
+        .replace("pad = \"pad\"\n", "right_arm = \"other\"\npad = \"pad\"\n")
+        .replace("[limits]", &format!("{second}[limits]"));
+    let (_folder, path) = in_new_folder("cell.toml");
+    fs::write(&path, bench).unwrap();
+    let said = say(&["teach", &path, "--arm", "right_arm"]);
+    assert_eq!(said.code, 2, "{}", said.err);
+    assert!(said.err.contains("the bench binds several arms") && said.err.contains("`--sensor pad`"), "{}", said.err);
 }
