@@ -135,15 +135,22 @@ impl Person {
 
     /// Moves the arm to a posture and measures it there. The first samples may be those from before the motion.
     fn measures(&mut self, question: &str, joints: [f64; 7]) -> [f64; 3] {
+        let from = self.shows(question, joints, "  measured, at [");
+        self.wait(from, &["] m\n"]);
+        let out = self.out();
+        let list = out[from..].split("measured, at [").nth(1).unwrap().split(']').next().unwrap();
+        let place: Vec<f64> = list.split(", ").map(|number| number.parse().unwrap()).collect();
+        place.try_into().unwrap()
+    }
+
+    /// Moves the arm to a posture, and presses Enter until the tool prints that it has measured it. Returns the place of
+    /// its answer.
+    fn shows(&mut self, question: &str, joints: [f64; 7], answer: &str) -> usize {
         self.tell(&format!("move {}", joints.map(|q| q.to_string()).join(" ")));
         loop {
             let from = self.types(question, "");
-            if self.wait(from, &["  measured, at [", "  not measured"]) == 0 {
-                self.wait(from, &["] m\n"]);
-                let out = self.out();
-                let list = out[from..].split("measured, at [").nth(1).unwrap().split(']').next().unwrap();
-                let place: Vec<f64> = list.split(", ").map(|number| number.parse().unwrap()).collect();
-                return place.try_into().unwrap();
+            if self.wait(from, &[answer, "  not measured"]) == 0 {
+                return from;
             }
         }
     }
@@ -311,8 +318,7 @@ fn an_arm_of_two_roles_is_one_arm_and_comments_in_the_list_stay() {
     }
     person.types("`s` ends the planes. Point 4:", "done");
     // The home of the robot file was not chosen for this cell.
-    person.measures("guide the arm to the free side", HOME);
-    person.wait(0, &["this side is free: +z of the base", "this side is free: -z of the base"]);
+    person.shows("guide the arm to the free side", HOME, "this side is free: ");
     person.types("keep-out plane 2: touch", "s");
     person.types("`keep_out` of the bench has rows already: 1.", "keep");
     person.types("Type `yes` to write these lines", "yes");
