@@ -13,7 +13,7 @@ pub(crate) struct Serial {
 impl Serial {
     pub(super) fn open(path: &str, baud: u32) -> Result<Self, String> {
         let port = SerialPort::open(path, baud).map_err(|error| advice::refusal(path, &error))?;
-        // What came before nobody has listened has no time. A port without this buffer has nothing to discard.
+        // Bytes that arrived before the port was opened have no time of arrival. A port without this buffer has none.
         let _ = port.discard_input_buffer();
         if let Some(warning) = latency::warning(path) {
             tracing::warn!("{warning}");

@@ -69,8 +69,8 @@ pub struct Params {
     /// Integers for the KRL program at the end of the run, so that it leaves the state command.
     #[param(unit = "1", default = Map(Default::default()))]
     krl_ints_at_end: Map<f64>,
-    /// Posture from which runs begin. A run refuses to move an arm that is elsewhere, and the check
-    /// knows where the sensor starts.
+    /// Posture from which runs begin. A run refuses to move an arm that is elsewhere, and the check knows where the sensor
+    /// starts.
     #[param(unit = "rad")]
     start: Option<Vec<f64>>,
     /// Bounds of the checks before the first command.

@@ -21,7 +21,7 @@ pub(super) struct Checks {
 }
 
 impl Checks {
-    /// Checks the state of a still robot. `is_first` is whether it has not followed commands in this run.
+    /// Checks the state of a still robot. `is_first` is whether no velocity has moved it in this run.
     ///
     /// # Errors
     /// What is wrong, and what to correct.

@@ -50,8 +50,8 @@ impl Live for Robot {
 }
 
 impl Robot {
-    /// Follows the robot on a connection, until the run or the connection ends. `is_first` is whether it has not followed velocities
-    /// in this run.
+    /// Follows the robot on a connection, until the run or the connection ends. `is_first` is whether no velocity has
+    /// moved the robot in this run.
     async fn serve(
         &self,
         stream: Stream,

@@ -114,8 +114,8 @@ pub struct Params {
     /// Maximum difference between the two.
     #[param(unit = "kg", above = 0.0, default = 0.1)]
     tool_mass_bound: f64,
-    /// Posture from which runs begin, with the joints in the order of the model. A run refuses to move an arm that is elsewhere, and the check
-    /// knows where the sensor starts.
+    /// Posture from which runs begin, with the joints in the order of the model. A run refuses to move an arm that is
+    /// elsewhere, and the check knows where the sensor starts.
     #[param(unit = "rad")]
     start: Option<Vec<f64>>,
     /// Bounds of the checks before the first command.

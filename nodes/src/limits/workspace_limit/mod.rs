@@ -33,8 +33,8 @@ pub use planes::Plane;
 ///
 /// `deceleration_m_per_s2` must not exceed the linear acceleration of the `acceleration_limit` behind it. That node
 /// keeps the direction of a change of motion, so rotating back and forth at full speed delays the braking. The sensor
-/// then passes a face or a plane by at most its maximum speed times the time in which the whole motion can be reversed: 8 mm with
-/// 0.05 m/s, 0.8 rad/s, 1 m/s² and 10 rad/s². The worst case found at 250 Hz is 2.3 mm.
+/// then passes a face or a plane by at most its maximum speed times the time in which the whole motion can be
+/// reversed: 8 mm with 0.05 m/s, 0.8 rad/s, 1 m/s² and 10 rad/s². The worst case found at 250 Hz is 2.3 mm.
 ///
 /// It checks the sensor's origin and no other point: a large sensor or holder needs a smaller box. When the pose is
 /// older than `max_age_ms` the output is absent.

@@ -198,7 +198,7 @@ impl<'d, 's> Dialogue<'d, 's> {
             let Some(fit) = self.points(&question, fit)? else { break };
             self.say(&format!("  the largest distance of a point from the plane is {:.1} mm", fit.residual * 1e3));
             if fit.residual > MAX_FLAT_M {
-                self.say("  warning: that is much: is it flat, and did the same point of the pad touch it?");
+                self.say("  warning: the points are not in one plane: is the surface flat, and did the same point of the pad touch it?");
             }
             if let Some(side) = self.free_side(|point| fit.facing(point))? {
                 rows.push(side.row(self.clearance));

@@ -107,7 +107,7 @@ pub struct Params {
     /// equal while nothing touches it. A pad that hangs and repeats its last frame is not noticed then.
     #[param(default = false)]
     pub(crate) repeats_are_new: bool,
-    /// Images per second, also if an image comes in parts. With `poll`, as often the pad is asked.
+    /// Images per second, also if an image comes in parts. With `poll`, the pad is asked this often.
     #[param(unit = "1/s", range = 0.001..=1e5)]
     pub(crate) rate_hz: f64,
     /// Time without a frame after which the pad is lost: five periods, and at least 100 ms.
