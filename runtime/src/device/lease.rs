@@ -29,12 +29,14 @@ pub(crate) struct Lease {
 }
 
 /// What the device and the graph know of a lease.
-#[derive(Debug)]
+#[derive(Debug, Default)]
 pub(crate) struct LeaseState {
     /// The newest epoch whose commands the device refuses.
     refused: AtomicU64,
     /// Whether the last commands that the device got are zero.
     rests: AtomicBool,
+    /// Whether every further command is zero, without a ramp.
+    is_cut: AtomicBool,
     /// Why the driver refuses the commands, and of which epoch.
     reason: Mutex<(u64, String)>,
 }
@@ -60,6 +62,12 @@ impl LeaseState {
         self.refuse(epoch);
     }
 
+    /// Makes every further command zero, without a ramp. Returns whether none was cut before.
+    #[cold]
+    pub(crate) fn cut(&self) -> bool {
+        !self.is_cut.swap(true, Ordering::AcqRel)
+    }
+
     /// Returns why the driver refuses the commands of an epoch; `None` if it gave no reason.
     #[cold]
     pub(crate) fn reason(&self, epoch: u64) -> Option<String> {
@@ -76,8 +84,7 @@ impl LeaseState {
 impl Lease {
     /// `held` are the commands at the start, which are zero.
     pub(crate) fn new(held: Commands, accelerations: Vec<Vec<f64>>, period: i64, silence: i64) -> Self {
-        let shared =
-            Arc::new(LeaseState { refused: AtomicU64::new(0), rests: AtomicBool::new(true), reason: Mutex::default() });
+        let shared = Arc::new(LeaseState { rests: AtomicBool::new(true), ..LeaseState::default() });
         Self { held, accelerations, at: 0, period, silence, follows: false, shared }
     }
 
@@ -103,7 +110,9 @@ impl Lease {
         }
         // After a time without a call, the device must not jump to what the graph reached meanwhile.
         self.follows &= now - last <= 2 * self.period;
-        if !self.shared.refuses(epoch) {
+        if self.shared.is_cut.load(Ordering::Acquire) {
+            self.held.rest();
+        } else if !self.shared.refuses(epoch) {
             self.follow(granted, now - last);
         } else if was_refused {
             self.ramp(now - last);
@@ -210,6 +219,24 @@ mod tests {
         grant(&mut commands, velocity, [0.0, 0.0], 1, renewed + 140 * MS);
         assert!(!lease.shared.rests());
         assert!(lease.hold(&commands, renewed + 140 * MS).are_zero() && lease.shared.rests());
+    }
+
+    #[test]
+    fn a_cut_is_zero_at_once_for_a_device_that_lags_behind_the_commands_or_refuses_them() {
+        let (mut lease, mut commands, velocity) = lease();
+        for now in 1..=100 {
+            grant(&mut commands, velocity, [1.0, 0.0], 1, now * 4 * MS);
+            lease.hold(&commands, now * 4 * MS);
+        }
+        // A call that is 60 ms late ends the following, and the graph's own ramp is as fast as the device can be.
+        grant(&mut commands, velocity, [0.4, 0.0], 1, 460 * MS);
+        assert!(lease.hold(&commands, 460 * MS).joints(velocity)[0] > 0.9);
+        grant(&mut commands, velocity, [0.0, 0.0], 1, 464 * MS);
+        assert!(lease.hold(&commands, 464 * MS).joints(velocity)[0] > 0.8);
+        assert!(lease.shared.cut() && !lease.shared.cut());
+        assert!(lease.hold(&commands, 468 * MS).are_zero() && lease.shared.rests());
+        grant(&mut commands, velocity, [0.1, 0.0], 2, 472 * MS);
+        assert!(lease.hold(&commands, 472 * MS).are_zero());
     }
 
     #[test]

@@ -334,6 +334,11 @@ impl Linked {
         self.moves_until = None;
     }
 
+    /// Makes every further command of the driver zero, without a ramp. Returns whether none was cut before.
+    pub(crate) fn cut(&self) -> bool {
+        self.lease.cut()
+    }
+
     /// Returns why the driver refuses the commands; `None` if it gave no reason.
     pub(crate) fn refusal(&self) -> Option<String> {
         self.lease.reason(self.epoch)

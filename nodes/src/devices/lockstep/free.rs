@@ -22,6 +22,9 @@ const RECEIVED_BYTES: usize = 1 << 16;
 /// Maximum time between two commands.
 const KEEP_ALIVE: Duration = Duration::from_millis(40);
 
+/// Longest time to wait for a simulator that does not read.
+const MOMENT: Duration = Duration::from_millis(200);
+
 /// The device before the run: it has read the hello message.
 pub(super) struct FreeRunning {
     pub(super) image: Output<Image>,
@@ -59,6 +62,8 @@ impl Live for FreeRunning {
                 Ok(())
             }
             Ok(End::Graph) => {
+                // The last command must not be lost because the one before still waits here.
+                session.drain().await;
                 session.send(&mut link);
                 session.leave(&link.reason()).await;
                 Ok(())
@@ -213,6 +218,14 @@ impl Session {
         self.outbox.is_empty()
     }
 
+    /// Waits until the connection has taken the last message, for a moment at most.
+    async fn drain(&mut self) {
+        let end = Instant::now() + MOMENT;
+        while !self.flush() && Instant::now() < end {
+            tokio::time::sleep(Duration::from_millis(5)).await;
+        }
+    }
+
     /// Brings the arm to rest after a failure, for as long as the simulator takes commands.
     async fn rest(&mut self, link: &mut Link, why: &str) {
         /// Longest time of the ramp; then the command is zero at once.
@@ -239,12 +252,8 @@ impl Session {
 
     /// Sends the end of the run, and gives the simulator a moment to read it.
     async fn leave(&mut self, reason: &str) {
-        const MOMENT: Duration = Duration::from_millis(200);
-        let end = Instant::now() + MOMENT;
         self.put(&Reply::End { reason }.line());
-        while !self.flush() && Instant::now() < end {
-            tokio::time::sleep(Duration::from_millis(5)).await;
-        }
+        self.drain().await;
         let mut rest = [0; 4096];
         // A connection that is dropped while the simulator still sends could lose the last message.
         let _ = tokio::time::timeout(MOMENT, async {

@@ -328,11 +328,21 @@ impl Engine {
         is_still
     }
 
-    /// Sets every command to zero at once, because the ramp of an arm takes too long.
+    /// Sets every command to zero at once, because the ramp of an arm takes too long. A live device that lags behind the
+    /// commands, or ramps by itself, gets zero too.
     pub(crate) fn cut_ramp(&mut self) {
-        for device in self.devices.iter_mut().filter(|device| !device.commands.are_zero()) {
-            tracing::warn!("`{}` still moves: its ramp takes too long, so its command is zero at once", device.name);
+        for device in self.devices.iter_mut().filter(|device| !device.rests()) {
+            let is_new = match &device.link {
+                DeviceLink::Live(linked) => linked.cut(),
+                _ => true,
+            };
             device.commands.rest();
+            if is_new {
+                tracing::warn!(
+                    "`{}` still moves: its ramp takes too long, so its command is zero at once",
+                    device.name
+                );
+            }
         }
     }
 

@@ -48,22 +48,27 @@ impl Engine {
 
     /// Stops the drivers for a reason, once each device has got commands of zero, or when `patience` is over. Does not wait
     /// for a driver that blocks.
-    pub(super) fn stop_drivers(&self, reason: &str, patience: Duration) {
+    pub(super) fn stop_drivers(&mut self, reason: &str, patience: Duration) {
         /// Time that a driver has to send its last command, beside two of its periods.
         const LAST_COMMAND: Duration = Duration::from_millis(50);
         const MAX_LAST_COMMAND: Duration = Duration::from_millis(500);
         /// Time that the drivers have to end.
         const GRACE: Duration = Duration::from_secs(1);
-        let running = || self.links().filter(|linked| !linked.has_ended());
-        if running().next().is_none() {
+        if self.running().next().is_none() {
             return;
         }
-        wait(patience, || running().all(Linked::rests));
+        wait(patience, || self.running().all(Linked::rests));
+        self.cut_ramp();
         let periods = self.devices.iter().filter(|device| matches!(device.link, DeviceLink::Live(_)));
         let longest = periods.map(|device| device.description.period).fold(0.0, f64::max);
         std::thread::sleep(Duration::from_secs_f64(2.0 * longest).clamp(LAST_COMMAND, MAX_LAST_COMMAND));
-        running().for_each(|linked| linked.stop(reason));
-        wait(GRACE, || running().next().is_none());
+        self.running().for_each(|linked| linked.stop(reason));
+        wait(GRACE, || self.running().next().is_none());
+    }
+
+    /// Returns the links whose drivers have not ended.
+    fn running(&self) -> impl Iterator<Item = &Linked> {
+        self.links().filter(|linked| !linked.has_ended())
     }
 
     fn links(&self) -> impl Iterator<Item = &Linked> {
