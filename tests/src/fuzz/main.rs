@@ -15,8 +15,9 @@ use tactflow_tests::workspace;
 const USAGE: &str = "\
 Lets the parsers of tactflow read spoilt inputs, and stops at the first that fails.
 
-Usage: fuzz TARGET [--inputs N] [--seed S] [--only K]
-       fuzz all    [--inputs N] [--seed S]
+Usage: fuzz [TARGET] [--inputs N] [--seed S] [--only K]
+
+Without a target it reads the inputs of all targets.
 
 Options:
   --inputs N  Number of inputs of each target [default: 1000000]
@@ -49,7 +50,7 @@ struct Arguments {
 
 fn main() -> ExitCode {
     let given: Vec<String> = std::env::args().skip(1).collect();
-    if given.is_empty() || given.iter().any(|word| word == "--help" || word == "-h") {
+    if given.iter().any(|word| word == "--help" || word == "-h") {
         let list = TARGETS.iter().map(|target| format!("  {:<16} {}\n", target.name, target.title));
         let _ = write!(std::io::stdout(), "{USAGE}{}", list.collect::<String>());
         return ExitCode::SUCCESS;
@@ -90,7 +91,10 @@ fn read_arguments(given: &[String]) -> Result<Arguments, String> {
             other => return Err(format!("`{other}` is neither a target nor an option")),
         }
     }
-    if arguments.target.is_empty() { Err("name a target, or `all`".into()) } else { Ok(arguments) }
+    if arguments.target.is_empty() {
+        arguments.target = "all".to_owned();
+    }
+    Ok(arguments)
 }
 
 /// Nobody may listen any more.

@@ -7,6 +7,7 @@
 //! A new format is one more entry in [`TARGETS`].
 
 mod campaign;
+mod files;
 mod mutate;
 mod recordings;
 mod wires;
@@ -51,6 +52,16 @@ pub const TARGETS: &[Target] = &[
     Target { name: "agni", title: "messages of the AGNI protocol", open: wires::agni },
     Target { name: "lwr_fri", title: "datagrams of FRI 1.0", open: wires::lwr_fri },
     Target { name: "ur", title: "packets of RTDE", open: wires::ur },
+    Target { name: "graph", title: "tasks", open: files::graphs },
+    Target { name: "part", title: "parts of tasks", open: files::parts },
+    Target { name: "bench", title: "benches", open: files::benches },
+    Target { name: "robot", title: "robots", open: files::robots },
+    Target { name: "pad", title: "descriptions of pads", open: files::pads },
+    Target { name: "scenario", title: "scenarios", open: files::scenarios },
+    Target { name: "urdf", title: "models of robots", open: files::models },
+    Target { name: "calibration", title: "calibrations of pads", open: files::calibrations },
+    Target { name: "set", title: "assignments of the command line", open: files::assignments },
+    Target { name: "words", title: "words of an operator", open: files::words },
 ];
 
 /// Returns the target with a name.
