@@ -20,7 +20,6 @@ pub mod start;
 pub mod stream;
 #[cfg(feature = "drivers")]
 pub mod ur;
-pub mod wires;
 #[cfg(feature = "drivers")]
 pub(crate) mod wrench;
 

@@ -76,7 +76,8 @@ impl Campaign {
     pub fn read_corpus(&self) -> Result<Tally, Failure> {
         let mut tally = Tally::default();
         for (number, input) in (0..).zip(&self.subject.corpus) {
-            self.take(number, input, &mut tally)?;
+            let taken = self.take(number, input, &mut tally);
+            taken.map_err(|failure| Failure { why: format!("a good input: {}", failure.why), ..failure })?;
         }
         Ok(tally)
     }

@@ -5,8 +5,8 @@
 
 use std::fmt::Write as _;
 
-use tactflow_nodes::devices::wires::{Listener, WIRES};
 use tactflow_nodes::random::Random;
+use tactflow_nodes::wires::{Listener, WIRES};
 
 use super::Subject;
 
@@ -49,12 +49,18 @@ fn subject(name: &'static str, peers: &[Peer]) -> Subject {
             if *has_datagrams {
                 return listener(&datagrams(bytes)).len() > 1;
             }
-            let whole = listener(&[bytes]);
-            assert_eq!(listener(&pieces(bytes)), whole, "the same bytes in pieces");
-            whole.len() > 1
+            let whole = messages(listener(&[bytes]));
+            assert_eq!(messages(listener(&pieces(bytes))), whole, "the same bytes in pieces");
+            !whole.is_empty()
         }),
         max_memory: |input| PER_BYTE * input.len() as u64 + BESIDE,
     }
+}
+
+/// Leaves out the counts of a pad: bytes of a line that has not ended may be counted later.
+fn messages(mut heard: Vec<String>) -> Vec<String> {
+    heard.pop_if(|last| last.starts_with("Tally"));
+    heard
 }
 
 /// Cuts bytes into pieces, the same each time.
@@ -151,7 +157,8 @@ fn shipped_pads() -> impl Iterator<Item = Peer> {
     crate::toml_files(&crate::workspace().join("graphs/pads")).into_iter().map(|file| {
         let text = std::fs::read_to_string(file).expect("a file that ships");
         let params = text.replace("[sensor]\n", "link = 'serial:/dev/null'\n").replace("[sensor.", "[");
-        Peer::stream(params, [&[0xAA, 0x55, 0xF0, 0xC4, 0x01][..], &[0; 2000]].concat())
+        let bytes = [&[0xAA, 0x55, 0xF0, 0xC4, 0x01][..], &[0; 2000]].concat();
+        if params.contains("poll =") { Peer::datagrams(params, &[bytes]) } else { Peer::stream(params, bytes) }
     })
 }
 

@@ -26,7 +26,7 @@ use tactflow_runtime::source::Code;
 
 use self::driver::{Agni as AgniDriver, PadPort};
 use self::layout::LayoutParams;
-pub(super) use self::listen::listen;
+pub(crate) use self::listen::listen;
 use self::sensors::{Pad, SensorParams, pads};
 use super::{arm, pad};
 use crate::arm::mount::Mount;

@@ -21,7 +21,7 @@ use crate::arm::model::load;
 use crate::builtin;
 use bridge::Bridge;
 use free::FreeRunning;
-pub(super) use listen::listen;
+pub(crate) use listen::listen;
 use message::Hello;
 use socket::Socket;
 

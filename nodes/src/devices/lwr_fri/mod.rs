@@ -25,7 +25,7 @@ use crate::arm::chain::Chain;
 use crate::arm::model::load;
 use crate::arm::mount::Mount;
 use driver::{Fri, Settings};
-pub(super) use listen::listen;
+pub(crate) use listen::listen;
 use per_joint::PerJoint;
 use target::{Bounds, Target};
 use wire::{Impedance, JOINTS, KRL_INT_COUNT};

@@ -20,7 +20,7 @@ pub(crate) use decoding::order::{Grid, Turn};
 use driver::PadDriver;
 #[cfg(feature = "cli")]
 pub(crate) use framing::check::{has_checksum, names as checksums, size_of as checksum_size};
-pub(super) use listen::listen;
+pub(crate) use listen::listen;
 use plan::Plan;
 pub use plan::params::Params;
 #[cfg(feature = "cli")]

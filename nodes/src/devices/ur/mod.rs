@@ -34,7 +34,7 @@ use crate::arm::chain::Chain;
 use crate::arm::model::load;
 use crate::arm::mount::Mount;
 use checks::Checks;
-pub(super) use listen::listen;
+pub(crate) use listen::listen;
 use program::PortNumbers;
 use recipe::JOINTS;
 use robot::Robot;

@@ -6,10 +6,10 @@
 use tactflow_runtime::node::{Mistake, Mistakes, Param, Reader};
 use tactflow_runtime::source::{SourceMap, parse_table};
 
-use super::lockstep;
-#[cfg(feature = "drivers")]
-use super::{agni, lwr_fri, stream, ur};
 use crate::builtin;
+use crate::devices::lockstep;
+#[cfg(feature = "drivers")]
+use crate::devices::{agni, lwr_fri, stream, ur};
 
 /// The receiving end of a connection. It takes the pieces in which bytes arrive, and returns a text for each message
 /// that it understands, and for each that it refuses.
