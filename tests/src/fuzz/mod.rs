@@ -25,12 +25,15 @@ pub struct Target {
     pub open: fn() -> Subject,
 }
 
+/// Reads an input. Returns whether the input is accepted, and panics if the parser breaks a promise.
+pub type Parser = Box<dyn Fn(&[u8]) -> bool>;
+
 /// The good inputs of a target, and its parser.
 pub struct Subject {
     /// Good inputs, at least one.
     pub corpus: Vec<Vec<u8>>,
-    /// Reads an input. Returns whether the input is accepted, and panics if the parser breaks a promise.
-    pub read: Box<dyn Fn(&[u8]) -> bool>,
+    /// Reads an input.
+    pub read: Parser,
     /// Returns how much memory may be in use at once while an input is read [bytes].
     pub max_memory: fn(&[u8]) -> u64,
 }
