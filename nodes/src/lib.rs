@@ -45,6 +45,7 @@ pub mod sim;
 mod tool;
 pub mod touch;
 pub mod usual;
+pub mod wires;
 
 use tactflow_runtime::catalogue::Catalogue;
 use tactflow_runtime::signal::{Scalar, Twist};

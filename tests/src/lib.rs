@@ -4,9 +4,11 @@
 pub mod cell;
 pub mod devices;
 pub mod examples;
+pub mod fuzz;
 pub mod large;
 pub mod nodes;
 pub mod saboteur;
+pub mod samples;
 pub mod true_pad;
 
 use std::path::{Path, PathBuf};

@@ -35,6 +35,7 @@ mod first_robot;
 mod fixes;
 mod flow;
 mod freshness;
+mod fuzz;
 #[cfg(target_os = "linux")]
 mod growth;
 mod keep_out;

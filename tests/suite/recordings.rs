@@ -2,16 +2,16 @@
 //! reason, and takes no more memory than ten times the file.
 
 mod hostile;
-mod samples;
 
 use std::hint::black_box;
 
 use tactflow_nodes::random::Random;
-use tactflow_nodes::recordings::{FORMATS, Hints, Recording, Refusal, read};
+use tactflow_nodes::recordings::{FORMATS, Hints, read};
+use tactflow_tests::fuzz::reason;
+use tactflow_tests::samples::{self, Sample, samples};
 use tactflow_tests::workspace;
 
 use hostile::Hostile;
-use samples::{Sample, samples};
 
 /// What reading may take beside ten times the file: what is looked at first, decoded.
 const BESIDE: i64 = 1 << 19;
@@ -20,33 +20,10 @@ const BESIDE: i64 = 1 << 19;
 fn check(bytes: &[u8], unpacked: usize, name: &str, hints: &Hints) -> Option<String> {
     let mut outcome = None;
     let counted = allocation_counter::measure(|| outcome = Some(black_box(read(bytes, name, hints))));
-    let (most, size) = (counted.bytes_max as i64, bytes.len().max(unpacked).max(hostile::inflated(bytes)) as i64);
+    let (most, size) = (counted.bytes_max as i64, bytes.len().max(unpacked).max(samples::inflated(bytes)) as i64);
     let reason = reason(outcome.unwrap(), name);
     assert!(most <= 10 * size + BESIDE, "{name}: {most} bytes for a file of {size}: {reason:?}");
     reason
-}
-
-/// Why a file was refused; a recording is sound.
-fn reason(outcome: Result<Recording, Refusal>, name: &str) -> Option<String> {
-    let said = match outcome {
-        Ok(recording) => {
-            assert!(recording.is_sound(), "{name}: {:?}", recording.shape);
-            return None;
-        }
-        Err(Refusal::Stranger) => return Some("stranger".into()),
-        Err(Refusal::Damaged { text, flaws }) => {
-            assert!(!flaws.is_empty(), "{name} is refused for no reason");
-            for flaw in &flaws {
-                assert!(text.get(flaw.span.clone()).is_some(), "{name}: {flaw:?} is not in the text");
-                assert!(!flaw.message.trim().is_empty(), "{name}: {flaw:?}");
-            }
-            flaws[0].message.clone()
-        }
-        Err(Refusal::Broken { message, .. } | Refusal::Silent { message, .. }) => message,
-        Err(Refusal::Contradicted { hint, message }) => format!("{hint}: {message}"),
-    };
-    assert!(!said.trim().is_empty() && said.len() < 2000, "{name}: {said}");
-    Some(said)
 }
 
 #[test]

@@ -79,6 +79,7 @@ const NODES: &[(&str, &[&str])] = &[
     ("flow", &["flow"]),
     ("devices", &["arm", "builtin", "motion", "recordings", "usual", "devices"]),
     ("sim", &["arm", "devices", "motion", "usual", "random", "roles", "sim"]),
+    ("wires", &["builtin", "devices"]),
     ("tool", &["arm", "builtin", "calibration", "devices", "motion", "recordings", "sim", "touch", "tool"]),
 ];
 

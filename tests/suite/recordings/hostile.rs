@@ -1,26 +1,6 @@
 //! A seeded generator of hostile files.
 
-use std::io::Read;
-
-use flate2::read::{DeflateDecoder, MultiGzDecoder};
 use tactflow_nodes::random::Random;
-
-/// How much comes out of what is packed, up to where it is damaged.
-pub(super) fn inflated(bytes: &[u8]) -> usize {
-    let mut packed: Box<dyn Read> = match bytes {
-        [0x1f, 0x8b, ..] => Box::new(MultiGzDecoder::new(bytes)),
-        [b'P', b'K', 3, 4, ..] if bytes.len() > 30 => {
-            let [name, extra] = [26, 28].map(|at| usize::from(u16::from_le_bytes([bytes[at], bytes[at + 1]])));
-            Box::new(DeflateDecoder::new(bytes.get(30 + name + extra..).unwrap_or(&[])))
-        }
-        _ => return 0,
-    };
-    let (mut size, mut out) = (0, [0; 4096]);
-    while let Ok(count @ 1..) = packed.read(&mut out) {
-        size += count;
-    }
-    size
-}
 
 /// A source of hostile files.
 pub(super) struct Hostile(pub(super) Random);

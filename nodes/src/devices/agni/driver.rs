@@ -49,14 +49,14 @@ impl PadPort {
 
 /// The time of a device: its stamps, unwrapped.
 #[derive(Debug, Clone, Copy, Default)]
-struct StampClock {
+pub(super) struct StampClock {
     last: Option<u32>,
     ticks: i64,
 }
 
 impl StampClock {
     /// Returns the time of a stamp, in its unit from the first one on. A step back is one, and no turn of the counter.
-    fn ticks(&mut self, stamp: u32) -> i64 {
+    pub(super) fn ticks(&mut self, stamp: u32) -> i64 {
         let step = stamp.wrapping_sub(self.last.unwrap_or(stamp)) as i32;
         self.last = Some(stamp);
         self.ticks += i64::from(step);

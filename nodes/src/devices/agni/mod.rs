@@ -7,9 +7,11 @@
 //! | `sensors` | which sensor is which pad |
 //! | `port`, `session` | the port and the handshake |
 //! | `driver` | the driver |
+//! | `listen` | what is understood of any bytes, without a port |
 
 mod driver;
 mod layout;
+mod listen;
 mod messages;
 mod port;
 mod sensors;
@@ -24,6 +26,7 @@ use tactflow_runtime::source::Code;
 
 use self::driver::{Agni as AgniDriver, PadPort};
 use self::layout::LayoutParams;
+pub(crate) use self::listen::listen;
 use self::sensors::{Pad, SensorParams, pads};
 use super::{arm, pad};
 use crate::arm::mount::Mount;

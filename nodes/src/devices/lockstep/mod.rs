@@ -4,14 +4,15 @@ mod bridge;
 mod frames;
 mod free;
 mod lines;
+mod listen;
 mod message;
 mod socket;
 
 use std::time::Duration;
 
-use tactflow_runtime::device::{Description, Device, Driver, OnSilence, Opened};
+use tactflow_runtime::device::{Description, Device, Driver, OnSilence, Opened, Output};
 use tactflow_runtime::node::{At, Describe, FilePath, Mistake, Mistakes, Param};
-use tactflow_runtime::signal::{ImageShape, Joint, JointsShape, Unit};
+use tactflow_runtime::signal::{Image, ImageShape, Joint, JointsShape, Unit};
 use tactflow_runtime::source::Code;
 
 use super::arm::{self, ArmPorts};
@@ -20,6 +21,7 @@ use crate::arm::model::load;
 use crate::builtin;
 use bridge::Bridge;
 use free::FreeRunning;
+pub(crate) use listen::listen;
 use message::Hello;
 use socket::Socket;
 
@@ -94,12 +96,7 @@ impl Device for Lockstep {
         let line =
             socket.line().map_err(|why| refusal(&params.address, format!("the simulator sent no `hello`: {why}")))?;
         let hello = message::hello(&line).map_err(|why| refusal(&params.address, format!("hello (line 1): {why}")))?;
-        let mut description = Description::every((hello.dt * 1e9).round() * 1e-9);
-        let shape = ImageShape { rows: hello.rows, cols: hello.cols, pitch: [hello.pitch; 2], unit: Unit::RAW };
-        let image = pad::fill(&mut description, shape, pad_facts(&hello));
-        let joints = joints(&hello, params.acceleration);
-        let arm = ArmPorts::fill(&mut description, &joints, model_facts(&hello, &params)?);
-        description.on_silence(OnSilence::Holds, free::COMMAND_TIMEOUT.as_secs_f64());
+        let (description, image, arm) = describe(&hello, &params)?;
         let driver = if hello.is_lockstep {
             Driver::Lockstep(Box::new(Bridge::new(image, arm, socket, hello, params)))
         } else {
@@ -107,6 +104,17 @@ impl Device for Lockstep {
         };
         Ok(Opened { description, driver })
     }
+}
+
+/// Returns what the device is, from the first message of the simulator.
+fn describe(hello: &Hello, params: &Params) -> Result<(Description, Output<Image>, ArmPorts), Mistakes> {
+    let mut description = Description::every((hello.dt * 1e9).round() * 1e-9);
+    let shape = ImageShape { rows: hello.rows, cols: hello.cols, pitch: [hello.pitch; 2], unit: Unit::RAW };
+    let image = pad::fill(&mut description, shape, pad_facts(hello));
+    let joints = joints(hello, params.acceleration);
+    let arm = ArmPorts::fill(&mut description, &joints, model_facts(hello, params)?);
+    description.on_silence(OnSilence::Holds, free::COMMAND_TIMEOUT.as_secs_f64());
+    Ok((description, image, arm))
 }
 
 fn connect(params: &Params) -> Result<Socket, Mistakes> {

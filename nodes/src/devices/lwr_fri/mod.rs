@@ -6,6 +6,7 @@
 
 mod driver;
 mod intake;
+mod listen;
 mod per_joint;
 mod permit;
 mod target;
@@ -24,6 +25,7 @@ use crate::arm::chain::Chain;
 use crate::arm::model::load;
 use crate::arm::mount::Mount;
 use driver::{Fri, Settings};
+pub(crate) use listen::listen;
 use per_joint::PerJoint;
 use target::{Bounds, Target};
 use wire::{Impedance, JOINTS, KRL_INT_COUNT};

@@ -6,6 +6,7 @@
 mod decoding;
 mod driver;
 mod framing;
+mod listen;
 mod plan;
 mod reader;
 
@@ -19,6 +20,7 @@ pub(crate) use decoding::order::{Grid, Turn};
 use driver::PadDriver;
 #[cfg(feature = "cli")]
 pub(crate) use framing::check::{has_checksum, names as checksums, size_of as checksum_size};
+pub(crate) use listen::listen;
 use plan::Plan;
 pub use plan::params::Params;
 #[cfg(feature = "cli")]

@@ -13,7 +13,7 @@ use super::recipe::{Output, Recipe, Refusal, State};
 use super::template::Version;
 
 /// Number of bytes that are received at once.
-const RECEIVED_BYTES: usize = 1 << 14;
+pub(super) const RECEIVED_BYTES: usize = 1 << 14;
 /// Version of the protocol.
 const PROTOCOL: u16 = 2;
 /// Number of packets that may come before an answer. A stream that another session left is longer.
@@ -197,7 +197,7 @@ fn log(command: u8, payload: &[u8]) -> bool {
 }
 
 /// Reads a version of the controller's software: major, minor, bugfix and build, each a `u32`.
-fn controller_version(answer: &[u8]) -> Option<Version> {
+pub(super) fn controller_version(answer: &[u8]) -> Option<Version> {
     let (numbers, _) = answer.as_chunks::<4>();
     let [major, minor, bugfix, ..] = numbers else { return None };
     Some([major, minor, bugfix].map(|number| u32::from_be_bytes(*number)))

@@ -1,27 +1,34 @@
-//! A good file of each format, as long as one likes.
+//! A good recording of each format, as long as one likes.
 
 use std::fmt::Write as _;
-use std::io::Write as _;
+use std::io::{Read as _, Write as _};
 
+use flate2::read::{DeflateDecoder, MultiGzDecoder};
 use tactflow_nodes::recordings::Hints;
 use tactflow_runtime::signal::Unit;
-use tactflow_tests::workspace;
+
+use crate::workspace;
 
 /// A good file.
-pub(super) struct Sample {
+pub struct Sample {
     /// The format that it is to be recognised as.
-    pub(super) format: &'static str,
+    pub format: &'static str,
     /// Name of the file.
-    pub(super) name: &'static str,
-    pub(super) bytes: Vec<u8>,
+    pub name: &'static str,
+    /// Its bytes.
+    pub bytes: Vec<u8>,
     /// Size of what is in it when that is packed.
-    pub(super) unpacked: usize,
+    pub unpacked: usize,
     /// What the bench has to say.
-    pub(super) hints: Hints,
+    pub hints: Hints,
 }
 
 /// One or more samples of each format, with that many frames or so.
-pub(super) fn samples(frames: usize) -> Vec<Sample> {
+///
+/// # Panics
+/// If the recording of the insoles is not there.
+#[must_use]
+pub fn samples(frames: usize) -> Vec<Sample> {
     let silent = Hints { unit: Some(Unit::RAW), pitch: Some([0.004, 0.005]), ..Hints::default() };
     let timed = Hints { rate_hz: Some(50.0), ..silent.clone() };
     let left = Hints { pad: Some("HX210.11.31.M11-DFM-LF S0073".into()), ..Hints::default() };
@@ -129,12 +136,13 @@ fn zebris(frames: usize) -> Vec<u8> {
 
 /// The real insoles for a few frames, and as many again and again for more.
 fn xsensor(frames: usize) -> Vec<u8> {
-    let text = std::fs::read_to_string(workspace().join("tests/data/recordings/xsensor_insoles.csv")).unwrap();
+    let text =
+        std::fs::read_to_string(workspace().join("tests/data/recordings/xsensor_insoles.csv")).expect("it ships");
     if frames < 10 {
         return text.into_bytes();
     }
-    let (head, frame) = text.split_once("FRAME,1464").unwrap();
-    let (frame, _) = frame.split_once("FRAME,1465").unwrap();
+    let (head, frame) = text.split_once("FRAME,1464").expect("its first frame");
+    let (frame, _) = frame.split_once("FRAME,1465").expect("its second frame");
     let mut long = head.to_owned();
     for i in 0..frames / 10 {
         let frame = frame.replacen("08:21:17.982", &format!("08:{:02}:{:02}.5", i / 60, i % 60), 1);
@@ -196,19 +204,23 @@ fn npz(frames: usize, method: u16) -> Vec<u8> {
 
 fn gzipped(bytes: &[u8]) -> Vec<u8> {
     let mut packed = flate2::write::GzEncoder::new(Vec::new(), flate2::Compression::default());
-    packed.write_all(bytes).unwrap();
-    packed.finish().unwrap()
+    packed.write_all(bytes).expect("memory can be written");
+    packed.finish().expect("memory can be written")
 }
 
 /// Returns a zip archive of the members, stored (0) or deflated (8).
-pub(super) fn zipped(method: u16, members: &[(&str, &[u8])]) -> Vec<u8> {
+///
+/// # Panics
+/// Never: memory can be written.
+#[must_use]
+pub fn zipped(method: u16, members: &[(&str, &[u8])]) -> Vec<u8> {
     let (mut archive, mut directory) = (Vec::new(), Vec::new());
     for (name, bytes) in members {
         let mut packed = bytes.to_vec();
         if method == 8 {
             let mut deflated = flate2::write::DeflateEncoder::new(Vec::new(), flate2::Compression::default());
-            deflated.write_all(bytes).unwrap();
-            packed = deflated.finish().unwrap();
+            deflated.write_all(bytes).expect("memory can be written");
+            packed = deflated.finish().expect("memory can be written");
         }
         let mut crc = flate2::Crc::new();
         crc.update(bytes);
@@ -224,4 +236,22 @@ pub(super) fn zipped(method: u16, members: &[(&str, &[u8])]) -> Vec<u8> {
     archive.extend([b"PK\x05\x06\0\0\0\0", &count.to_le_bytes()[..], &count.to_le_bytes()].concat());
     archive.extend([&size.to_le_bytes()[..], &at.to_le_bytes(), &[0; 2]].concat());
     archive
+}
+
+/// How much comes out of what is packed, up to where it is damaged.
+#[must_use]
+pub fn inflated(bytes: &[u8]) -> usize {
+    let mut packed: Box<dyn std::io::Read> = match bytes {
+        [0x1f, 0x8b, ..] => Box::new(MultiGzDecoder::new(bytes)),
+        [b'P', b'K', 3, 4, ..] if bytes.len() > 30 => {
+            let [name, extra] = [26, 28].map(|at| usize::from(u16::from_le_bytes([bytes[at], bytes[at + 1]])));
+            Box::new(DeflateDecoder::new(bytes.get(30 + name + extra..).unwrap_or(&[])))
+        }
+        _ => return 0,
+    };
+    let (mut size, mut out) = (0, [0; 4096]);
+    while let Ok(count @ 1..) = packed.read(&mut out) {
+        size += count;
+    }
+    size
 }
