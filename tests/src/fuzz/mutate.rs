@@ -103,19 +103,27 @@ impl Mutator<'_> {
             let length = self.random.below(300);
             return (0..length).map(|_| self.random.below(256) as u8).collect();
         }
-        let mut bytes = self.any().to_vec();
-        for _ in 0..=self.random.below(MAX_CHANGES) {
-            bytes = match self.random.below(10) {
-                0 | 1 => self.spoil_bytes(bytes),
-                2..=4 => self.spoil_token(&bytes),
-                5 | 6 => self.spoil_lines(&bytes),
-                7 => self.spoil_range(bytes),
-                8 => self.spoil_number(bytes),
-                _ => self.splice(&bytes),
-            };
+        let good = self.any().to_vec();
+        let mut bytes = good.clone();
+        let mut changes = 1 + self.random.below(MAX_CHANGES);
+        // Changes can cancel out, and some do nothing to short inputs.
+        while changes > 0 || bytes == good {
+            bytes = self.change(bytes);
             bytes.truncate(MAX_BYTES);
+            changes = changes.saturating_sub(1);
         }
         bytes
+    }
+
+    fn change(&mut self, bytes: Vec<u8>) -> Vec<u8> {
+        match self.random.below(10) {
+            0 | 1 => self.spoil_bytes(bytes),
+            2..=4 => self.spoil_token(&bytes),
+            5 | 6 => self.spoil_lines(&bytes),
+            7 => self.spoil_range(bytes),
+            8 => self.spoil_number(bytes),
+            _ => self.splice(&bytes),
+        }
     }
 
     fn any(&mut self) -> &[u8] {
@@ -233,17 +241,28 @@ impl Mutator<'_> {
 mod tests {
     use super::*;
 
+    fn make(corpus: &[Vec<u8>]) -> Vec<Vec<u8>> {
+        (0..1000).map(|number| Mutator { corpus, random: Random::new(1, number) }.make()).collect()
+    }
+
     #[test]
     fn inputs_differ_from_each_other_and_from_the_corpus_and_repeat() {
-        let corpus = [b"[graph]\nclock = \"pad\"\n".to_vec(), (0..99).collect(), Vec::new()];
-        let make = |number| Mutator { corpus: &corpus, random: Random::new(1, number) }.make();
-        let made: Vec<Vec<u8>> = (0..1000).map(make).collect();
-        assert_eq!(made, (0..1000).map(make).collect::<Vec<_>>());
+        let corpus = [b"[graph]\nclock = \"pad\"\n".to_vec(), (0..99).collect()];
+        let made = make(&corpus);
+        assert_eq!(made, make(&corpus));
         let mut different = made.clone();
         different.sort();
         different.dedup();
         let spoilt = different.iter().filter(|bytes| !corpus.contains(bytes)).count();
-        assert!(spoilt > 850, "{spoilt}");
+        assert!(spoilt > 900, "{spoilt}");
         assert!(made.iter().all(|bytes| bytes.len() <= MAX_BYTES));
+    }
+
+    #[test]
+    fn an_empty_input_is_spoilt_too() {
+        let made = make(&[Vec::new()]);
+        let spoilt = made.iter().filter(|bytes| !bytes.is_empty()).count();
+        // What is left is pure chance of no bytes.
+        assert!(spoilt > 990, "{spoilt}");
     }
 }
