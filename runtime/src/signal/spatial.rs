@@ -30,14 +30,8 @@ impl Twist {
 }
 
 /// A pose: the rotation matrix and translation [m] that transform points of one frame to another.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Pose(pub IsometryMatrix3<f64>);
-
-impl Default for Pose {
-    fn default() -> Self {
-        Self(IsometryMatrix3::identity())
-    }
-}
 
 /// The shape of a twist, which has no properties: its frames belong to the wire.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
