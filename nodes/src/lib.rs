@@ -113,6 +113,7 @@ pub fn catalogue() -> Catalogue {
         .node::<servo::adjoint::Adjoint>()
         .group("limits: the limiters that every motion must pass through on its way to an arm")
         .node::<limits::bumpless::Bumpless>()
+        .node::<limits::lost_contact::LostContact>()
         .node::<limits::contact_limit::ContactLimit>()
         .node::<limits::second_contact_limit::SecondContactLimit>()
         .node::<limits::workspace_limit::WorkspaceLimit>()

@@ -9,7 +9,7 @@ use std::path::Path;
 use nalgebra::Vector3;
 use tactflow_nodes::arm::chain::Chain;
 use tactflow_nodes::arm::{damped, joint_limits, model, mount::Mount, null_space};
-use tactflow_nodes::limits::{blind_limit, bumpless, contact_limit, joint_limit, workspace_limit};
+use tactflow_nodes::limits::{blind_limit, bumpless, contact_limit, joint_limit, lost_contact, workspace_limit};
 use tactflow_nodes::motion::axis::{half_angle, wrap_axial};
 use tactflow_nodes::motion::bounds::{approach_twist, scale_twist};
 use tactflow_nodes::servo::{adjoint::adjoint, integral::integrate};
@@ -37,6 +37,8 @@ struct Law {
 const P: Law = Law { kp: 0.5, ki: 0.0, kd: 0.0, within: f64::INFINITY, bound: 1.0, limit: f64::INFINITY };
 const LAWS: [Law; 4] = [P, P, Law { ki: 0.1, within: 10.0, bound: 5.0, ..P }, P];
 const BLIND: blind_limit::Bounds = blind_limit::Bounds { time: 20.0, way: 0.1, linear: 1.0, angular: 10.0 };
+const LOSS: lost_contact::Times = lost_contact::Times { debounce: 20_000_000, wait: 500_000_000 };
+const MANNER: lost_contact::Manner = lost_contact::Manner { retreat: 0.02, search: 0.005, half: [0.0178; 2] };
 const POSTURE: [f64; 7] = [0.0, 0.5, 0.0, -1.3, 0.0, 1.3, 0.0];
 
 /// The controller and everything it remembers.
@@ -62,6 +64,7 @@ pub(crate) struct Fused {
     rows: [null_space::Row; 7],
     smooth: [Twist; 2],
     reached: Twist,
+    course: lost_contact::Course,
     corners: [Vector3<f64>; 4],
     budget: blind_limit::Budget,
     /// Speed of the fastest corner of the pad [m/s].
@@ -124,6 +127,7 @@ impl Fused {
             rows: [[0.0; 8]; 7],
             smooth: [Twist::default(); 2],
             reached: Twist::default(),
+            course: lost_contact::Course::default(),
             corners: blind_limit::corners(&shape),
             budget: blind_limit::Budget::default(),
             speed: 0.0,
@@ -193,7 +197,9 @@ impl Fused {
         target.0 *= scale_twist(&target, 0.05, 0.8);
         let mut twist = bumpless::smooth(&target, last, offset, half);
         let is_there = wanted.is_some() || *offset != Twist::default();
+        let phase = self.course.next(self.now, self.contact_at.is_some(), false, &LOSS);
         if is_there {
+            twist = lost_contact::allowed(&twist, phase, &MANNER);
             let load = contact_limit::load(&self.shape, &self.image, [0.5 * 2000.0, 0.5 * 240.0]);
             let allowed = |times| contact_limit::allowed_speed(times, 0.5, 0.05);
             contact_limit::bar(&mut twist, load.centre, allowed(load.sum / 2000.0));

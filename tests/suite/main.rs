@@ -45,6 +45,7 @@ mod limits;
 mod lint;
 mod live;
 mod lockstep;
+mod lost_contact;
 mod lwr_fri;
 mod merge;
 mod modes;

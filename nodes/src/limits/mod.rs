@@ -8,6 +8,7 @@ pub mod blind_limit;
 pub mod bumpless;
 pub mod contact_limit;
 pub mod joint_limit;
+pub mod lost_contact;
 pub mod second_contact_limit;
 pub mod twist_limit;
 pub mod workspace_limit;
