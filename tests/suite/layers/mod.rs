@@ -14,6 +14,7 @@ use tactflow_tests::workspace;
 const RUNTIME: &[&str] = &[
     "lib",
     "source",
+    "random",
     "signal",
     "node",
     "device",
