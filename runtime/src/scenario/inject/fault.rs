@@ -81,7 +81,7 @@ impl Fault {
             FaultKind::Garbage => {
                 image.iter_mut().for_each(|cell| *cell = self.random.uniform(0.0, self.number) as f32);
             }
-            FaultKind::Repeat | FaultKind::Missing | FaultKind::Delay => {}
+            FaultKind::Repeat | FaultKind::Missing | FaultKind::Late => {}
         }
     }
 }

@@ -45,7 +45,7 @@ fn one(mut table: InjectTable, compiled: &Compiled) -> Result<Injection, Box<Dia
         return Err(Diagnostic::new(Code::BadValue, cells.span.clone(), message).help(help).into());
     }
     if let Some(reading) = &mut table.reading {
-        reading.settle(Some(shape.unit), &mut Vec::new()).map_err(|mistake| into_diagnostic(mistake))?;
+        reading.settle(Some(shape.unit), &mut Vec::new()).map_err(into_diagnostic)?;
     }
     Ok(Injection { device, port, shape, table })
 }

@@ -60,7 +60,7 @@ pub(crate) enum FaultKind {
     /// Some frames are missing.
     Missing,
     /// Frames arrive late, with their old stamps.
-    Delay,
+    Late,
 }
 
 /// Cells of an image.
@@ -99,7 +99,7 @@ impl FaultKind {
             Self::Drift => "drift",
             Self::Repeat => "repeat",
             Self::Missing => "missing",
-            Self::Delay => "delay",
+            Self::Late => "late",
         }
     }
 
@@ -112,7 +112,7 @@ impl FaultKind {
             Self::Garbage => &[("reading", "reading = 4095")],
             Self::Gain => &[("factor", "factor = 0.8")],
             Self::Drift => &[("reading_per_s", "reading_per_s = 1.0")],
-            Self::Delay => &[("delay_ms", "delay_ms = 8.0")],
+            Self::Late => &[("delay_ms", "delay_ms = 8.0")],
             Self::Repeat | Self::Missing => &[],
         }
     }

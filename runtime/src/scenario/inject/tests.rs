@@ -135,7 +135,7 @@ fn garbage_and_nan_are_what_they_are_called() {
 
 #[test]
 fn delayed_frames_arrive_late_with_their_own_stamps_and_never_go_back() {
-    let (arrived, _) = run(&entry("fault = \"delay\"\ndelay_ms = 4.0\nfrom_s = 0.1\nto_s = 0.2"), 1);
+    let (arrived, _) = run(&entry("fault = \"late\"\ndelay_ms = 4.0\nfrom_s = 0.1\nto_s = 0.2"), 1);
     for (tick, stamp, sequence, values) in &arrived {
         let frame = sequence - 1;
         assert_eq!((*stamp, values), (frame as i64 * 1_000_000, &good(frame)));
