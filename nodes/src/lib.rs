@@ -36,7 +36,6 @@ pub mod devices;
 pub mod flow;
 pub mod limits;
 pub mod motion;
-pub use tactflow_runtime::random;
 pub mod recordings;
 pub mod roles;
 pub mod servo;
