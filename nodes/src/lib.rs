@@ -36,7 +36,6 @@ pub mod devices;
 pub mod flow;
 pub mod limits;
 pub mod motion;
-pub mod random;
 pub mod recordings;
 pub mod roles;
 pub mod servo;

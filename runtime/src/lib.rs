@@ -9,6 +9,7 @@
 //! - [`engine`]: the tick and the run around it; [`fault`]: what ends or halts a run
 //! - [`device`]: the contract of devices
 //! - [`example`]: example graphs from a catalogue
+//! - [`random`]: seeded random numbers
 //! - [`record`]: recordings of runs; [`scenario`]: checks on the results of runs
 //! - [`harness`]: test rigs for nodes and graphs
 //! - `cli`: the command line as a library, behind the feature `cli`
@@ -26,6 +27,7 @@ pub mod fault;
 pub mod graph;
 pub mod harness;
 pub mod node;
+pub mod random;
 pub mod record;
 pub mod scenario;
 pub mod signal;

@@ -1,8 +1,8 @@
 //! `true_pad`: a simulated pad whose ground truth is known in closed form.
 
-use tactflow_nodes::random::Random;
 use tactflow_runtime::device::{Commands, Description, Device, DeviceError, Driver, Opened, Output, Samples, Stepped};
 use tactflow_runtime::node::{Describe, Mistakes, Param};
+use tactflow_runtime::random::Random;
 use tactflow_runtime::signal::{Image, ImageShape, Scalar, ScalarShape, Unit};
 
 /// Parameters of `true_pad`.

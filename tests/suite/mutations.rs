@@ -14,8 +14,8 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
-use tactflow_nodes::random::Random;
 use tactflow_runtime::graph::{Request, compile};
+use tactflow_runtime::random::Random;
 use tactflow_tests::{catalogue, workspace};
 
 use crate::course::{Course, course};

@@ -5,8 +5,8 @@ mod hostile;
 
 use std::hint::black_box;
 
-use tactflow_nodes::random::Random;
 use tactflow_nodes::recordings::{FORMATS, Hints, read};
+use tactflow_runtime::random::Random;
 use tactflow_tests::fuzz::reason;
 use tactflow_tests::samples::{self, Sample, samples};
 use tactflow_tests::workspace;

@@ -4,7 +4,7 @@ use tactflow_runtime::signal::Unit;
 
 use super::ForceCurve;
 use super::log::Log;
-use crate::random::Random;
+use tactflow_runtime::random::Random;
 
 /// Maximum force on a tactel [N].
 pub(super) const MAX_FORCE_N: f64 = 5.0;

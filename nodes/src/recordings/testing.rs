@@ -3,7 +3,7 @@
 use std::io::Write;
 
 use super::{Hints, Recording, Refusal, read};
-use crate::random::Random;
+use tactflow_runtime::random::Random;
 
 /// Cuts, swaps, flips, inserts or repeats a few bytes.
 fn damage(random: &mut Random, bytes: &mut Vec<u8>) {

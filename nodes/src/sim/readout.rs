@@ -7,7 +7,7 @@
 
 use tactflow_runtime::node::Param;
 
-use crate::random::Random;
+use tactflow_runtime::random::Random;
 
 /// Properties of the electronics.
 #[derive(Debug, Clone, Param)]

@@ -80,7 +80,7 @@ mod tests {
 
     use super::super::moments::Moments;
     use super::*;
-    use crate::random::Random;
+    use tactflow_runtime::random::Random;
 
     fn rig<N: Node>(params: &str) -> Result<NodeRig, Mistakes> {
         let image = ImageShape { rows: 20, cols: 24, pitch: [0.005, 0.004], unit: Unit::NEWTON };

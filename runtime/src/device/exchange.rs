@@ -115,6 +115,21 @@ impl Samples {
         sample
     }
 
+    /// Passes on the newest sample of a port of the same device.
+    pub(crate) fn pass_on(&mut self, other: &Self, port: usize) {
+        let PortSample { kind, slot, stamp, sequence, state, losses, loss, .. } = &other.ports[port];
+        other.arenas.copy(*kind, *slot, &mut self.arenas, *slot);
+        let sample = self.renew(port, *stamp, *sequence, state.clone());
+        (sample.losses, sample.loss) = (*losses, loss.clone());
+    }
+
+    /// Takes over the counts and the clock of the same device, with one more count.
+    pub(crate) fn take_counts(&mut self, other: &Self, more: (&'static str, u64)) {
+        self.counts.clone_from(&other.counts);
+        self.counts.push(more);
+        self.clock = other.clock;
+    }
+
     /// Copies the samples of the same device, in place.
     pub(crate) fn copy_from(&mut self, other: &Self) {
         for PortSample { kind, slot, .. } in &other.ports {

@@ -3,6 +3,7 @@
 use std::ops::Range;
 
 use super::check_table::{CheckBlock, CheckTable};
+use super::inject::{InjectBlock, blocks};
 use crate::node::{At, FilePath, Mistake, Param, Reader, Spanned};
 use crate::source::{Code, Item, Key, SourceMap, Table, Value, suggestion};
 
@@ -69,6 +70,7 @@ pub(super) struct Document {
     /// The keys of the section, or `None` if a mistake in them has been reported.
     pub(super) scenario: Option<ScenarioTable>,
     pub(super) checks: Vec<CheckBlock>,
+    pub(super) faults: Vec<InjectBlock>,
 }
 
 impl Document {
@@ -83,7 +85,7 @@ impl Document {
 }
 
 /// The sections of a scenario file.
-const SECTIONS: [&str; 2] = ["scenario", "check"];
+const SECTIONS: [&str; 3] = ["scenario", "check", "inject"];
 
 /// Reads the sections of a scenario file. Mistakes go to the reader.
 pub(super) fn document(root: &Table, reader: &mut Reader<'_>) -> Document {
@@ -108,7 +110,8 @@ pub(super) fn document(root: &Table, reader: &mut Reader<'_>) -> Document {
         CheckBlock { key: key.clone(), value, table }
     };
     let checks = checks.into_iter().flat_map(|table| &table.entries).map(check).collect();
-    Document { section, scenario, checks }
+    let faults = blocks(root, reader);
+    Document { section, scenario, checks, faults }
 }
 
 /// Returns a section with the span of its name, to which diagnostics of missing keys point.

@@ -36,6 +36,7 @@ impl Scenario {
         found.extend(reader.mistakes.into_iter().map(into_diagnostic));
         let for_s = document.scenario.as_ref().map(|scenario| scenario.for_s);
         found.extend(document.checks.iter().flat_map(|check| check.mistakes(for_s)));
+        found.extend(document.faults.iter().filter_map(|fault| fault.mistake(for_s)));
         found.extend(without_checks(&root, &document));
         let files = document.files(&loader.sources);
         let unreadable: Vec<Diagnostic> =

@@ -6,6 +6,7 @@ use super::bounds::{figures, number, papers, rows_of};
 use super::check_table::{CheckBlock, CheckTable};
 use super::document::{Document, ScenarioTable};
 use super::figure::{Bound, Figure};
+use super::inject::resolve;
 use super::judge::FigureRow;
 use super::model::{Check, Scenario, row};
 use super::observer::DONE;
@@ -32,6 +33,7 @@ pub(super) fn look_up(
         checks.push(check);
         rows.extend(its_rows);
     }
+    let injections = resolve(&document.faults, plan, &mut lookup.found);
     let scenario = document.scenario.as_ref().map(|table| {
         let from = table.from.as_ref().and_then(|word| Some((word.value.clone(), lookup.flag(word)?)));
         let never_lost = table.never_lost.as_ref().and_then(|word| lookup.flag(word));
@@ -43,7 +45,8 @@ pub(super) fn look_up(
             seeds: table.seeds.as_ref().map(|seeds| seeds.list.clone()).unwrap_or_default(),
             facts: table.facts.iter().filter_map(|word| lookup.fact(word)).collect(),
             request,
-            seed_keys: lookup.seeds(table, catalogue),
+            seed_keys: lookup.seeds(table, catalogue, !injections.is_empty()),
+            injections,
             from,
             never_lost,
             stays_in: table.stays_in.as_ref().and_then(|word| lookup.mode(&word.value)),
@@ -262,15 +265,15 @@ impl Lookup<'_> {
         })
     }
 
-    /// Returns the keys that set the seed. Without such a key, every seed would give the same run.
-    fn seeds(&mut self, table: &ScenarioTable, catalogue: &Catalogue) -> Vec<String> {
+    /// Returns the keys that set the seed. Without such a key and without faults, every seed would give the same run.
+    fn seeds(&mut self, table: &ScenarioTable, catalogue: &Catalogue, has_faults: bool) -> Vec<String> {
         let has_seed = |kind: &str| {
             let known = catalogue.find_device(kind);
             known.is_some_and(|device| device.params().iter().any(|param| param.name == "seed"))
         };
         let devices = self.plan.outline().devices.iter().filter(|device| has_seed(&device.kind.text));
         let keys: Vec<String> = devices.map(|device| format!("devices.{}.seed", device.name)).collect();
-        if let Some(seeds) = table.seeds.as_ref().filter(|_| keys.is_empty()) {
+        if let Some(seeds) = table.seeds.as_ref().filter(|_| keys.is_empty() && !has_faults) {
             let message = "no device of this bench has a `seed`, so every run would be the same";
             let diagnostic = Diagnostic::new(Code::UnknownKey, seeds.span.clone(), message);
             self.found.push(diagnostic.help("remove `seeds` to run the scenario once"));

@@ -1,15 +1,16 @@
 //! Scenarios: a task on a bench with seeds, a duration and checks on the results.
 //!
 //! `document` and `check_table` read the file, `load` checks it, and `lookup` resolves the ports and modes that it
-//! names. `trial` runs it with one seed while `observer` collects the readings in the `window` of each check.
+//! names. `inject` spoils the images of devices. `trial` runs it with one seed while `observer` collects the readings in the `window` of each check.
 //! [`measure`] and `figures` compute the figures of a run, and [`judge`] combines the figures of all runs. A scenario
-//! cannot change its task or its bench; it only sets the seed.
+//! cannot change its task or its bench; it only sets the seed and injects faults.
 
 mod bounds;
 mod check_table;
 mod document;
 pub mod figure;
 mod figures;
+mod inject;
 pub mod judge;
 mod load;
 mod lookup;

@@ -1,6 +1,7 @@
 //! A checked scenario: its runs, its checks and the rows of its table.
 
 use super::figure::{Bound, Figure};
+use super::inject::Injection;
 use super::judge::FigureRow;
 use super::window::{ModeName, Window};
 use crate::graph::Request;
@@ -16,6 +17,8 @@ pub struct Scenario {
     /// Facts and parameters of devices to print beside the figures.
     pub facts: Vec<(String, toml::Value)>,
     pub(super) request: Request,
+    /// The faults that every run injects.
+    pub(super) injections: Vec<Injection>,
     /// `devices.NAME.seed` of each device that has a seed.
     pub(super) seed_keys: Vec<String>,
     /// The flag that defines time 0: its name in the file, and its column.

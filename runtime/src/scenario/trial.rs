@@ -4,6 +4,7 @@ use std::path::Path;
 
 use serde::Serialize;
 
+use super::inject::inject;
 use super::judge::FigureRow;
 use super::model::Scenario;
 use super::observer::{NotChecked, Observer, seconds};
@@ -58,7 +59,10 @@ impl Scenario {
             Some(Trial { seed, time, failure: Some(failure), not_checked: Vec::new(), figures })
         };
         let mut engine = match compile(catalogue, &self.seeded(seed)) {
-            Ok(plan) => Engine::new(plan),
+            Ok(mut compiled) => {
+                inject(&mut compiled, &self.injections, seed.unwrap_or(0));
+                Engine::new(compiled)
+            }
             Err(report) => {
                 let first = report.diagnostics.first().map(|first| first.message.clone());
                 return failed(0.0, first.unwrap_or_default());

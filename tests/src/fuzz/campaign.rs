@@ -7,7 +7,7 @@ use std::ops::Range;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::time::{Duration, Instant};
 
-use tactflow_nodes::random::Random;
+use tactflow_runtime::random::Random;
 
 use super::mutate::Mutator;
 use super::{Subject, Target};

@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use tactflow_nodes::random::Random;
+use tactflow_runtime::random::Random;
 
 /// Longest input [bytes]. Longer ones only take longer.
 const MAX_BYTES: usize = 1 << 16;

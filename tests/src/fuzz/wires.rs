@@ -5,8 +5,8 @@
 
 use std::fmt::Write as _;
 
-use tactflow_nodes::random::Random;
 use tactflow_nodes::wires::{Listener, WIRES};
+use tactflow_runtime::random::Random;
 
 use super::Subject;
 

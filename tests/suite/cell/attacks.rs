@@ -13,7 +13,7 @@ use std::process::{Child, Command, Stdio};
 use std::thread;
 use std::time::{Duration, Instant};
 
-use tactflow_nodes::random::Random;
+use tactflow_runtime::random::Random;
 use tempfile::TempDir;
 
 use super::benches::{calibration, lwr_bench, lwr_wires, simulation, ur_ball, ur_bench, ur_wires};

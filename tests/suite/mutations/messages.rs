@@ -5,8 +5,8 @@ use std::collections::BTreeMap;
 use std::fs;
 use std::path::PathBuf;
 
-use tactflow_nodes::random::Random;
 use tactflow_runtime::graph::{Request, compile};
+use tactflow_runtime::random::Random;
 use tactflow_runtime::source::{Report, Severity};
 use tactflow_tests::catalogue;
 

@@ -5,13 +5,13 @@
 use std::f64::consts::PI;
 
 use libm::erf;
-use tactflow_nodes::random::Random;
 use tactflow_nodes::touch::binarize::binarize;
 use tactflow_nodes::touch::hough::Hough;
 use tactflow_nodes::touch::label::{contact, number, paint, trace};
 use tactflow_nodes::touch::moments::Moments;
 use tactflow_runtime::harness::NodeRig;
 use tactflow_runtime::node::Node;
+use tactflow_runtime::random::Random;
 use tactflow_runtime::signal::{Grid, Image, ImageShape, Mask, Regions, Scalar, Unit};
 
 const SIZE: usize = 16;

@@ -1,6 +1,6 @@
 //! A seeded generator of hostile files.
 
-use tactflow_nodes::random::Random;
+use tactflow_runtime::random::Random;
 
 /// A source of hostile files.
 pub(super) struct Hostile(pub(super) Random);

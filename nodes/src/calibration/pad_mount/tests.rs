@@ -8,7 +8,7 @@ use proptest::prelude::*;
 use super::*;
 use crate::motion::pose::testing::any_pose;
 use crate::motion::pose::{pose_of, rotation_vector};
-use crate::random::Random;
+use tactflow_runtime::random::Random;
 
 /// Five places on a pad of 80 by 160 mm.
 const PLACES: [[f64; 2]; 5] = [[0.03, 0.06], [-0.03, 0.06], [-0.03, -0.06], [0.03, -0.06], [0.0, 0.01]];

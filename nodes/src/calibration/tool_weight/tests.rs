@@ -5,7 +5,7 @@ use proptest::prelude::*;
 
 use super::*;
 use crate::motion::pose::pose_of;
-use crate::random::Random;
+use tactflow_runtime::random::Random;
 
 const QUARTER: f64 = std::f64::consts::FRAC_PI_2;
 

@@ -9,7 +9,7 @@ use tactflow_runtime::signal::{Freshness, PoseShape, ScalarShape, Unit};
 
 use super::*;
 use crate::motion::axis::wrap_axial;
-use crate::random::Random;
+use tactflow_runtime::random::Random;
 
 /// A ridge: how far off a place is from it, to its left, and its direction there.
 type Ridge = fn([f64; 2]) -> (f64, f64);

@@ -24,9 +24,9 @@ use super::world::World;
 use crate::arm::mount::Mount;
 use crate::devices::arm::{self, ArmPorts};
 use crate::devices::{nanos, pad, period_of};
-use crate::random::Random;
 use crate::roles::ground_truth;
 use crate::usual::{USUAL_PRESSURE_N, USUAL_THRESHOLD_N};
+use tactflow_runtime::random::Random;
 
 /// Parameters of `sim_bench`.
 #[derive(Debug, Clone, Param)]

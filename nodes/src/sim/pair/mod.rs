@@ -33,8 +33,8 @@ use super::steps::check_step;
 use crate::arm::mount::Mount;
 use crate::devices::arm::{self, ArmPorts};
 use crate::devices::{nanos, pad, period_of};
-use crate::random::Random;
 use crate::usual::{USUAL_PRESSURE_N, USUAL_REACH_M, USUAL_THRESHOLD_N};
+use tactflow_runtime::random::Random;
 
 /// Parameters of `sim_pair`.
 #[derive(Debug, Clone, Param)]

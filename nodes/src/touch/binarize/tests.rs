@@ -6,7 +6,7 @@ use tactflow_runtime::node::At;
 use tactflow_runtime::signal::{Image, ImageShape, Mask, Unit};
 
 use super::*;
-use crate::random::Random;
+use tactflow_runtime::random::Random;
 
 fn rig(params: &str, rows: usize, cols: usize) -> Result<NodeRig, Mistakes> {
     let shape = ImageShape { rows, cols, pitch: [0.005; 2], unit: Unit::NEWTON };

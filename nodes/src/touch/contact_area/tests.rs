@@ -7,7 +7,7 @@ use tactflow_runtime::signal::{Grid, Image, ImageShape, Mask, Shape, Unit};
 
 use super::super::binarize::binarize;
 use super::*;
-use crate::random::Random;
+use tactflow_runtime::random::Random;
 
 const PITCH: [f64; 2] = [0.005, 0.004];
 const TACTEL: f64 = PITCH[0] * PITCH[1];

@@ -7,7 +7,7 @@ use tactflow_runtime::node::At;
 use tactflow_runtime::signal::{Grid, Image, Mask, Shape, Unit};
 
 use super::*;
-use crate::random::Random;
+use tactflow_runtime::random::Random;
 
 fn wires(rows: usize, cols: usize, pitch: [f64; 2]) -> [(&'static str, Shape); 2] {
     let image = ImageShape { rows, cols, pitch, unit: Unit::NEWTON };

@@ -5,7 +5,7 @@ use tactflow_runtime::node::At;
 use tactflow_runtime::signal::ImageShape;
 
 use super::*;
-use crate::random::Random;
+use tactflow_runtime::random::Random;
 
 fn rig(params: &str, rows: usize, cols: usize) -> Result<NodeRig, Mistakes> {
     let image = ImageShape { rows, cols, pitch: [0.005, 0.004], ..ImageShape::default() };

@@ -9,7 +9,7 @@ use tactflow_runtime::node::At;
 use tactflow_runtime::signal::{Grid, Unit};
 
 use super::*;
-use crate::random::Random;
+use tactflow_runtime::random::Random;
 
 const PITCH: [f64; 2] = [0.005, 0.004];
 

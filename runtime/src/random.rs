@@ -4,7 +4,7 @@
 /// ones.
 ///
 /// ```
-/// use tactflow_nodes::random::Random;
+/// use tactflow_runtime::random::Random;
 ///
 /// let (mut first, mut second) = (Random::new(7, 0), Random::new(7, 0));
 /// assert_eq!(first.uniform(-1.0, 1.0), second.uniform(-1.0, 1.0));

@@ -1,0 +1,87 @@
+//! What a fault does to one image.
+
+use super::table::{FaultKind, InjectTable};
+use crate::random::Random;
+
+/// A fault of a run.
+pub(super) struct Fault {
+    kind: FaultKind,
+    /// The cells that it concerns.
+    cells: Vec<usize>,
+    /// Value of a cell, factor or speed, as the fault needs it.
+    number: f64,
+    /// Fraction of the frames that are hit, if they are hit at random.
+    rate: Option<f64>,
+    /// Number of frames that are still hit, if they are counted.
+    left: u64,
+    /// Time by which frames arrive later [ns].
+    pub(super) delay: i64,
+    /// Times between which it is there [ns].
+    from: i64,
+    to: i64,
+    random: Random,
+}
+
+/// Returns a time in nanoseconds.
+fn nanos(seconds: f64) -> i64 {
+    (seconds * 1e9).round() as i64
+}
+
+impl Fault {
+    /// Creates the fault of an entry for `cells`.
+    pub(super) fn new(table: &InjectTable, cells: Vec<usize>, random: Random) -> Self {
+        let reading = table.reading.as_ref().map(|reading| reading.number);
+        Self {
+            kind: table.fault.value,
+            cells,
+            number: reading.or(table.factor).or(table.reading_per_s).unwrap_or(0.0),
+            rate: table.rate,
+            left: table.frames.unwrap_or(0),
+            delay: table.delay_ms.map_or(0, |ms| nanos(ms * 1e-3)),
+            from: nanos(table.from_s),
+            to: table.to_s.map_or(i64::MAX, nanos),
+            random,
+        }
+    }
+
+    /// Returns its kind if it hits the frame that was sampled at `stamp` [ns]. Call it once for each frame.
+    pub(super) fn hits(&mut self, stamp: i64) -> Option<FaultKind> {
+        if !(self.from..self.to).contains(&stamp) {
+            return None;
+        }
+        let is_hit = match (self.kind, self.rate) {
+            (FaultKind::Nan | FaultKind::Spike | FaultKind::Garbage | FaultKind::Repeat | FaultKind::Missing, None) => {
+                self.left > 0
+            }
+            (_, Some(rate)) => self.random.uniform(0.0, 1.0) < rate,
+            (_, None) => true,
+        };
+        self.left = self.left.saturating_sub(u64::from(is_hit));
+        is_hit.then_some(self.kind)
+    }
+
+    /// Spoils the cells of a frame that was sampled at `stamp` [ns], if the fault concerns values.
+    pub(super) fn spoil(&mut self, kind: FaultKind, stamp: i64, image: &mut [f32]) {
+        let number = self.number as f32;
+        let mut each = |change: &dyn Fn(f32) -> f32| {
+            if self.cells.is_empty() {
+                image.iter_mut().for_each(|cell| *cell = change(*cell));
+            }
+            self.cells.iter().for_each(|cell| image[*cell] = change(image[*cell]));
+        };
+        match kind {
+            FaultKind::Dead => each(&|_| 0.0),
+            FaultKind::Stuck | FaultKind::Spike => each(&|_| number),
+            FaultKind::Nan => each(&|_| f32::NAN),
+            FaultKind::Gain => each(&|cell| cell * number),
+            FaultKind::Drift => {
+                let by = (self.number * ((stamp - self.from) as f64 * 1e-9)) as f32;
+                each(&|cell| cell + by);
+            }
+            FaultKind::Garbage => {
+                image.iter_mut().for_each(|cell| *cell = self.random.uniform(0.0, self.number) as f32);
+            }
+            FaultKind::Repeat | FaultKind::Missing | FaultKind::Late => {}
+        }
+    }
+}
