@@ -198,4 +198,6 @@ fn check(params: &Params, joints: &JointsShape, columns: &JointsShape, period: f
 }
 
 #[cfg(test)]
+mod cases;
+#[cfg(test)]
 mod tests;
