@@ -1,8 +1,8 @@
 """Judges `ik_sink` beside the differential inverse kinematics of pink and of Drake, on the same cases.
 
-CONTRIBUTING.md says how to run it. A third of the postures are near a singularity or have joints at a limit, and a third
-of the twists are slides in the plane of the pad. The velocity of each solver
-is judged by the Jacobian of Pinocchio, in the frame of the sensor. Angles between twists count 1 rad as 0.2 m.
+CONTRIBUTING.md says how to run it. A third of the postures are near a singularity or have joints at a limit, and a
+third of the twists are slides in the plane of the pad. The velocity of each solver is judged by the Jacobian of
+Pinocchio, in the frame of the sensor. Angles between twists count 1 rad as 0.2 m.
 
 Every solver gets the same home posture, the same gain toward it (0.5/s), and the limits of the model:
 
@@ -20,8 +20,8 @@ The metrics, of which a lower value is better:
 - stuck: motions of 0.5 s with the twist held after which the arm follows less than a tenth of the twist.
 - slowed: mean fraction of the twist that is missing along its direction.
 - jump: change of the velocities between two postures that are 1e-4 rad apart [rad/s].
-- posture: distance of the motion of the elbow from the one toward home, as a fraction of the latter; arms with an elbow,
-  ordinary postures.
+- posture: distance of the motion of the elbow from the one toward home, as a fraction of the latter; arms with an
+  elbow, ordinary postures.
 """
 
 import argparse

@@ -7,13 +7,13 @@ use std::path::Path;
 use nalgebra::{Matrix6, Vector6};
 use tactflow_runtime::harness::NodeRig;
 use tactflow_runtime::node::FilePath;
+use tactflow_runtime::random::Random;
 use tactflow_runtime::signal::{Jacobian, JacobianShape, Joints, JointsShape, PoseShape, Twist, TwistShape, Unit};
 
 use super::IkSink;
 use crate::arm::chain::Chain;
 use crate::arm::model::load;
 use crate::arm::mount::Mount;
-use crate::random::Random;
 
 const CASES: usize = 30_000;
 /// Length of a step of a motion [s], and their number.
