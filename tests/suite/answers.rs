@@ -263,9 +263,9 @@ fn a_broken_graph_is_not_shown() {
 fn diagnostics_are_there_for_programs() {
     let said = json(&["check", HYBRID, "tests/errors/frame_mismatch.toml", "tests/errors/unused_node.toml"], 2);
     let lines = [
-        "graphs/hybrid.toml: ok True, 25 nodes, 0.004 s",
+        "graphs/hybrid.toml: ok True, 26 nodes, 0.004 s",
         "tests/errors/frame_mismatch.toml: ok False",
-        "tests/errors/unused_node.toml: ok True, 27 nodes, 0.004 s",
+        "tests/errors/unused_node.toml: ok True, 28 nodes, 0.004 s",
     ];
     assert_lines(&said, &lines);
     assert!(said.contains("error[frame-mismatch] tests/errors/frame_mismatch.toml:"), "{said}");
@@ -285,7 +285,7 @@ fn a_warning_fails_nothing_unless_it_is_asked_to() {
     let told = say(&["check", graph]);
     assert_eq!(
         (told.code, told.out.as_str()),
-        (0, "tests/errors/unused_node.toml: ok, 27 nodes, one tick every 4 ms\n")
+        (0, "tests/errors/unused_node.toml: ok, 28 nodes, one tick every 4 ms\n")
     );
     assert!(told.err.starts_with("warning[unused-node]: no output of `label` is used\n"), "{}", told.err);
     assert!(told.err.ends_with("\n5 warnings\n"), "{}", told.err);

@@ -28,13 +28,13 @@ fn what_goes_well_ends_with_0_and_says_nothing_on_stderr() {
     let run = say(&["run", PRESS]);
     assert_eq!((run.code, run.err.as_str()), (0, ""));
     for text in
-        ["23 nodes, one tick every 100 ms", "touch.image: 28x28 tactels", "no more samples after 31.1", "309 ticks"]
+        ["24 nodes, one tick every 100 ms", "touch.image: 28x28 tactels", "no more samples after 31.1", "309 ticks"]
     {
         assert!(run.out.contains(text), "`{text}` is not in\n{}", run.out);
     }
     let check = say(&["check", PRESS, HYBRID]);
     let expected =
-        format!("{PRESS}: ok, 23 nodes, one tick every 100 ms\n{HYBRID}: ok, 25 nodes, one tick every 4 ms\n");
+        format!("{PRESS}: ok, 24 nodes, one tick every 100 ms\n{HYBRID}: ok, 26 nodes, one tick every 4 ms\n");
     assert_eq!((check.code, check.err.as_str(), check.out), (0, "", expected));
 }
 
@@ -168,7 +168,7 @@ fn another_bench_is_another_pad() {
     let text = text.replace("rate_hz = 250", "rate_hz = 500").replace("../robots/", "builtin:");
     fs::write(&bench, text).unwrap();
     let run = say(&["run", HYBRID, "--bench", &bench, "--for", "1s"]);
-    assert!(run.out.starts_with(&format!("{HYBRID}: 25 nodes, one tick every 2 ms\n")), "{}", run.out);
+    assert!(run.out.starts_with(&format!("{HYBRID}: 26 nodes, one tick every 2 ms\n")), "{}", run.out);
 }
 
 /// The line of a port or of a part of one in the table of what came out.
@@ -232,7 +232,7 @@ fn a_mistake_in_set_points_into_set() {
 
 #[test]
 fn rows_are_read_by_a_reader_that_is_not_ours_and_say_the_same_in_both_formats() {
-    for (graph, rows) in [(PRESS, "309 rows, 144 columns, "), (HYBRID, "1000 rows, 155 columns, ")] {
+    for (graph, rows) in [(PRESS, "309 rows, 152 columns, "), (HYBRID, "1000 rows, 163 columns, ")] {
         let [csv, ndjson] = ["rows.csv", "rows.ndjson"].map(|name| {
             let (_folder, path) = in_new_folder(name);
             let bench = if graph == HYBRID { &[MOCK][..] } else { &[] };

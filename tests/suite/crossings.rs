@@ -27,7 +27,7 @@ fn nothing_of_one_arm_can_be_given_to_the_other_one() {
         // Wires.
         ("parts.left_move.in.position='right_arm.position'", "frame-mismatch"),
         ("parts.left_move.in.equilibrium='right_arm.equilibrium'", "frame-mismatch"),
-        ("parts.left_move.in.image='right_touch.image'", "foreign-input"),
+        ("parts.left_move.in.image='right_touch.image'", "frame-mismatch"),
         ("parts.left_move.in.contact='right_touch.present'", "foreign-input"),
         ("parts.left_move.in.twist='right_reach.twist'", "foreign-input"),
         ("parts.left_touch.in.image='right_pad.image'", "foreign-fact"),

@@ -39,7 +39,7 @@ pub use load::{PadLoad, load};
 /// ```toml
 /// [nodes.contact_limit]
 /// type = "contact_limit"
-/// in.twist = "bumpless.twist"
+/// in.twist = "lost_contact.twist"
 /// in.image = "calibrate.image"
 /// force_n = 15.0
 /// peak_n = 3.0
