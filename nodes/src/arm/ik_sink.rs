@@ -149,7 +149,7 @@ impl Node for IkSink {
 
 /// Moves a spatial twist in the base to the origin of the sensor, along the axes of the sensor: Ad(T^-1).
 #[inline]
-fn at_sensor(Pose(pose): &Pose, twist: &Twist) -> [f64; 6] {
+pub(super) fn at_sensor(Pose(pose): &Pose, twist: &Twist) -> [f64; 6] {
     let (p, r) = (&pose.translation.vector, pose.rotation.matrix());
     let [vx, vy, vz, wx, wy, wz] = twist.0.into();
     let v = [vx + wy * p.z - wz * p.y, vy + wz * p.x - wx * p.z, vz + wx * p.y - wy * p.x];
@@ -197,7 +197,5 @@ fn check(params: &Params, joints: &JointsShape, columns: &JointsShape, period: f
     refuse_any(mistakes)
 }
 
-#[cfg(test)]
-mod cases;
 #[cfg(test)]
 mod tests;

@@ -5,6 +5,8 @@ pub mod chain;
 pub mod compose_poses;
 pub mod contact_point;
 pub mod damped;
+#[cfg(test)]
+mod ik_cases;
 pub mod ik_sink;
 pub mod inverse_pose;
 pub mod joint_limits;

@@ -192,7 +192,12 @@ fn the_sensor_moves_as_was_wanted_but_for_the_damping() {
                 let lack = square * square / (least * least + square * least + square * square);
                 let wanted = at_sensor(&moment.pose, &wanted);
                 let off = (at_sensor(&moment.pose, &moved(&moment.jacobian, solved)) - wanted).norm();
-                assert!(off <= (lack + 1e-6) * wanted.norm(), "{graph} at {} s: off by {off}, {lack}", moment.time);
+                // Rounding alone is left of a motion that ends.
+                assert!(
+                    off <= (lack + 1e-6) * wanted.norm() + 1e-15,
+                    "{graph} at {} s: off by {off}, {lack}",
+                    moment.time
+                );
                 compared += 1;
             }
             assert!(compared > 200, "{graph}: {compared} twists");

@@ -55,6 +55,10 @@ fn is_left_out(value: &Value, node: Option<usize>, net: &Net<'_>, opened: &Opene
         let arms = node.map_or(&[][..], |node| net.arms_of(node));
         return net.limit(arms, fact.word.split_once('.').map_or("", |(_, name)| name)).is_none();
     }
+    // What is no role at all has no facts that may be missing.
+    if net.flat.roles.position(net.role_at(node, role, fact.place.start)).is_none() {
+        return false;
+    }
     // A misspelt name of a fact that is there is not one that may be missing.
     let is_missing = || match find_fact(&fact, &value.span, node, net, opened) {
         Ok(_) => false,

@@ -10,10 +10,10 @@ use tactflow_runtime::node::FilePath;
 use tactflow_runtime::random::Random;
 use tactflow_runtime::signal::{Jacobian, JacobianShape, Joints, JointsShape, PoseShape, Twist, TwistShape, Unit};
 
-use super::IkSink;
-use crate::arm::chain::Chain;
-use crate::arm::model::load;
-use crate::arm::mount::Mount;
+use super::chain::Chain;
+use super::ik_sink::{IkSink, at_sensor};
+use super::model::load;
+use super::mount::Mount;
 
 const CASES: usize = 30_000;
 /// Length of a step of a motion [s], and their number.
@@ -69,7 +69,7 @@ impl Arm {
     fn sigma(&self, q: &[f64]) -> f64 {
         let mut columns = vec![Twist::default(); q.len()];
         let pose = self.chain.forward(q, &mut columns);
-        let columns = columns.iter().map(|column| Vector6::from(super::at_sensor(&pose, column)));
+        let columns = columns.iter().map(|column| Vector6::from(at_sensor(&pose, column)));
         let gram: Matrix6<f64> = columns.map(|column| column * column.transpose()).sum();
         gram.symmetric_eigenvalues().min().max(0.0).sqrt()
     }
