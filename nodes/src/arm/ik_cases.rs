@@ -1,5 +1,6 @@
 //! Random postures and twists with the answers of `ik_sink`, for `tests/oracles/ik_judge.py`.
 
+use std::f64::consts::{FRAC_PI_2, FRAC_PI_4};
 use std::fmt::Write as _;
 use std::fs;
 use std::path::Path;
@@ -29,8 +30,8 @@ type Robot = (&'static str, &'static str, &'static [f64], f64);
 
 const ROBOTS: [Robot; 3] = [
     ("lwr4p", "lwr_7_link", &[0.0, 0.5, 0.0, -1.3, 0.0, 1.3, 0.0], 10.0),
-    ("panda", "panda_link8", &[0.0, -0.1, 0.0, -2.2, 0.0, 2.1, 0.7854], 7.5),
-    ("ur5e", "tool0", &[0.0, -1.7, -2.0, -1.0124, 1.5708, 0.0], 10.0),
+    ("panda", "panda_link8", &[0.0, -0.1, 0.0, -2.2, 0.0, 2.1, FRAC_PI_4], 7.5),
+    ("ur5e", "tool0", &[0.0, -1.7, -2.0, -1.0124, FRAC_PI_2, 0.0], 10.0),
 ];
 
 struct Arm {
@@ -57,7 +58,9 @@ impl Arm {
     fn answer(&mut self, q: &[f64], twist: &[f64; 6]) -> Vec<f64> {
         let mut columns = vec![Twist::default(); q.len()];
         let pose = self.chain.forward(q, &mut columns);
-        self.rig.set("twist", crate::servo::adjoint::adjoint(&pose, &Twist((*twist).into())));
+        let twist = Twist((*twist).into());
+        let (v, w) = (pose.0.rotation * twist.linear(), pose.0.rotation * twist.angular());
+        self.rig.set("twist", Twist::new(v + pose.0.translation.vector.cross(&w), w));
         self.rig.set("sensor_pose", pose);
         self.rig.set("jacobian", Jacobian(columns.into()));
         self.rig.set("joints", Joints(q.into()));
