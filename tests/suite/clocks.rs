@@ -285,7 +285,9 @@ fn a_slow_simulator_keeps_its_lease_and_a_flood_of_frames_keeps_no_command_back(
         period: Duration::from_millis(100),
     };
     let seen = run(slow);
-    assert!(seen.halts.is_empty(), "{:?}", seen.halts);
+    // A peer that takes long to end is silent after its last frame, which makes the 26th tick.
+    let halts: Vec<_> = seen.halts.iter().filter(|halt| halt.fault.tick <= 25).collect();
+    assert!(halts.is_empty(), "{halts:?}");
     assert!(seen.answered > 12, "{} of 25 frames are answered", seen.answered);
     // Frames whose times say 8 ms come as fast as the connection takes them.
     let flood = Peer { frames: 20_000, period: Duration::from_micros(1), ..slow };
