@@ -39,7 +39,14 @@ const LAWS: [Law; 4] = [P, P, Law { ki: 0.1, within: 10.0, bound: 5.0, ..P }, P]
 const BLIND: blind_limit::Bounds = blind_limit::Bounds { time: 20.0, way: 0.1, linear: 1.0, angular: 10.0 };
 const LOSS: lost_contact::Times = lost_contact::Times { debounce: 20_000_000, wait: 500_000_000 };
 const MANNER: lost_contact::Manner = lost_contact::Manner { retreat: 0.02, search: 0.005, half: [0.0178; 2] };
+/// The way of an approach at 10 mm/s that goes on for two periods and brakes with 1 m/s², which raw ceilings leave [m].
+const WAY: f64 = 0.01 * 0.2 + 0.01 * 0.01 / 2.0;
+const CEILINGS: [contact_limit::Ceiling; 2] = [ceiling(2000.0), ceiling(240.0)];
 const POSTURE: [f64; 7] = [0.0, 0.5, 0.0, -1.3, 0.0, 1.3, 0.0];
+
+const fn ceiling(load: f64) -> contact_limit::Ceiling {
+    contact_limit::Ceiling { load, stiffness: load / WAY, deceleration: 1.0, approach: f64::INFINITY }
+}
 
 /// The controller and everything it remembers.
 pub(crate) struct Fused {
@@ -200,10 +207,7 @@ impl Fused {
         let phase = self.course.next(self.now, self.contact_at.is_some(), false, &LOSS);
         if is_there {
             twist = lost_contact::allowed(&twist, phase, &MANNER);
-            let load = contact_limit::load(&self.shape, &self.image, [0.5 * 2000.0, 0.5 * 240.0]);
-            let allowed = |times| contact_limit::allowed_speed(times, 0.5, 0.05);
-            contact_limit::bar(&mut twist, load.centre, allowed(load.sum / 2000.0));
-            contact_limit::bar(&mut twist, load.place, allowed(load.peak / 240.0));
+            self.contact(&mut twist, tick);
             let (velocity, place) = (pose.0.rotation * twist.linear(), pose.0.translation.vector);
             let corners = [[-0.8, -0.4, 0.1], [-0.3, 0.4, 0.7]];
             twist.0 *= workspace_limit::scale(&velocity, &place, corners, 1.0, 2.0 * tick.max_gap);
@@ -215,6 +219,21 @@ impl Fused {
         }
         approach_twist(&mut self.reached, &twist, dt, 10.0 * dt);
         (is_there || self.reached != Twist::default()).then_some(self.reached)
+    }
+
+    /// The ceilings of the sum and of a tactel, in raw readings.
+    fn contact(&self, twist: &mut Twist, tick: &Tick) {
+        let (shape, image) = (&self.shape, &self.image);
+        let half = [shape.cols as f64 * shape.pitch[0] / 2.0, shape.rows as f64 * shape.pitch[1] / 2.0];
+        let load = contact_limit::load(image);
+        let delay = 2.0 * tick.dt.max(0.1);
+        let [force, peak] = CEILINGS;
+        contact_limit::bar(twist, half, force.allowed_speed(load.sum, delay), || {
+            (load.sum >= 0.1 * force.load).then(|| contact_limit::centre(shape, image))
+        });
+        contact_limit::bar(twist, half, peak.allowed_speed(load.peak, delay), || {
+            Some(contact_limit::highest(shape, image, load.peak))
+        });
     }
 
     /// The fraction of a motion that the budgets without a contact let pass.

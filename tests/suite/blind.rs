@@ -84,7 +84,7 @@ fn a_contact_on_another_arm_does_not_end_a_motion() {
 fn coupled(gate: &str) -> Request {
     let blocks = [
         "nodes.left_soft={ type = 'contact_limit', in.twist = 'left_sum.twist', in.image = 'left_touch.image', \
-         force_n = 15.0, peak_n = 3.0, approach_m_per_s = 0.05 }",
+         force_n = 15.0, peak_n = 3.0, deceleration_m_per_s2 = 2.0 }",
         "parts.left_move.in.twist='left_soft.twist'",
         "nodes.copy_error={ type = 'feature_error', in.k = 'left_soft.force', setpoint.k = 1.0 }",
         "nodes.copy_pid={ type = 'pid', in.error = 'copy_error.error', gains.k.kp = 0.1 }",

@@ -87,7 +87,7 @@ fn the_time_to_report_many_mistakes_is_short() {
         }),
     ];
     for (sort, mistake) in sorts {
-        let growth = report_time(mistake, SMALL * 4) / report_time(mistake, SMALL);
+        let growth = report_time(mistake, SMALL * 2) / report_time(mistake, SMALL / 2);
         assert!(growth <= MAX_REPORT_GROWTH, "{sort}: the time grows by {growth:.1} with four times the mistakes");
     }
 }

@@ -209,7 +209,7 @@ fn chain(kinds: &[u8]) -> Vec<Link> {
         2 => link::<AccelerationLimit>(&accelerations, false, &[]),
         3 => link::<WorkspaceLimit>(BOX, true, &[("pose", PoseShape::default().into())]),
         _ => link::<ContactLimit>(
-            "force_n = 10.0\npeak_n = 4.0\napproach_m_per_s = 0.2",
+            "force_n = 10.0\npeak_n = 4.0\ndeceleration_m_per_s2 = 1.0\nfoam_n_per_m3 = 1e5",
             false,
             &[("image", pad().into())],
         ),
@@ -372,7 +372,7 @@ fn an_object_at_the_rim_counts_like_one_in_the_middle() {
 
 #[test]
 fn what_cannot_be() {
-    let contact = "force_n = 1.0\npeak_n = 2.0\napproach_m_per_s = 0.1";
+    let contact = "force_n = 1.0\npeak_n = 2.0\ndeceleration_m_per_s2 = 1.0";
     let wires: [(&str, Shape); 2] = [("twist", TwistShape.into()), ("image", pad().into())];
     // The sections [limits] of several files may add up to it.
     let rig = NodeRig::new::<ContactLimit>(contact, &wires).unwrap();

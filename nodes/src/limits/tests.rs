@@ -18,7 +18,8 @@ use super::workspace_limit::WorkspaceLimit;
 const SPEEDS: &str = "linear_m_per_s = 0.05\nangular_rad_per_s = 0.8";
 const ACCELERATIONS: &str = "linear_m_per_s2 = 1.0\nangular_rad_per_s2 = 10.0";
 const BOX: &str = "min_m = [-0.1, -0.1, -0.1]\nmax_m = [0.1, 0.1, 0.1]\ndeceleration_m_per_s2 = 1.0";
-const CEILINGS: &str = "force_n = 10.0\npeak_n = 4.0\napproach_m_per_s = 0.2";
+/// On a pad of 2 by 2 tactels of 10 mm: 40 N/m under the pad, and 80 N/m under a tactel.
+const CEILINGS: &str = "force_n = 10.0\npeak_n = 4.0\ndeceleration_m_per_s2 = 1.0\nfoam_n_per_m3 = 1e5";
 
 fn rig<N: Node>(params: &str) -> NodeRig {
     let pad = ImageShape { rows: 2, cols: 2, pitch: [0.01; 2], unit: Unit::NEWTON };
@@ -119,34 +120,89 @@ fn a_timeless_image_acts_too() {
     }
 }
 
+/// Returns the load after an approach from `load` goes on for `delay` and brakes with 1 m/s², against a spring.
+fn after_braking(load: f64, speed: f64, stiffness: f64, delay: f64) -> f64 {
+    load + stiffness * (speed * delay + speed * speed / 2.0)
+}
+
+/// Returns the speed after which the load is `ceiling`, by bisection; 0 if it is above.
+fn braked_at(ceiling: f64, load: f64, stiffness: f64, delay: f64) -> f64 {
+    let (mut slow, mut fast) = (0.0, 10.0);
+    for _ in 0..100 {
+        let middle = 0.5 * (slow + fast);
+        if after_braking(load, middle, stiffness, delay) <= ceiling { slow = middle } else { fast = middle }
+    }
+    slow
+}
+
 #[test]
-fn without_a_contact_the_motion_passes() {
-    // With `begin = 0` the approach is slowed down from the first contact on, and not before.
-    let mut rig = rig::<ContactLimit>(&format!("{CEILINGS}\nbegin = 0"));
-    let into = twist([0.0, 0.0, 0.5, 0.0, 0.0, 0.0]);
-    for (cell, passes) in [(0.0, 0.5), (-3.0, 0.5), (0.025, 0.2 * 0.99), (2.5, 0.0)] {
-        rig.set("image", Image::from_cells(2, &[cell; 4]));
-        rig.set("twist", into);
-        rig.step();
-        assert!((get(&rig).unwrap().0[2] - passes).abs() < 1e-7, "{cell} on each tactel: {:?}", get(&rig));
+fn at_every_load_the_approach_can_stop_below_both_ceilings() {
+    for age in [0, 3] {
+        // The image is as old as the steps before this one, and the command acts for two periods of 1 ms.
+        let delay = f64::from(age) * 1e-3 + 0.002;
+        for sum in [1.0f32, 2.5, 5.0, 9.0, 9.99, 10.0, 30.0] {
+            for cells in [[sum / 4.0; 4], [sum, 0.0, 0.0, 0.0], [sum / 2.0, 0.0, 0.0, sum / 2.0]] {
+                let mut rig = rig::<ContactLimit>(CEILINGS);
+                rig.set("image", Image::from_cells(2, &cells));
+                (0..age).for_each(|_| rig.step());
+                rig.set("twist", twist([0.3, 0.0, 5.0, 0.0, 0.0, 0.2]));
+                rig.step();
+                let out = get(&rig).unwrap();
+                let by_sum = braked_at(10.0, f64::from(sum), 40.0, delay);
+                let by_tactel = braked_at(4.0, f64::from(cells[0]), 80.0, delay);
+                let allowed = by_sum.min(by_tactel);
+                assert!((out.0[2] - allowed).abs() < 1e-6, "{allowed} m/s of {cells:?}, {age} ms old: {out:?}");
+                assert_eq!((out.0[0], out.0[5]), (0.3, 0.2), "the other components stay");
+            }
+        }
     }
 }
 
 #[test]
-fn the_approach_slows_down_linearly_from_begin_to_the_ceiling() {
-    let mut rig = rig::<ContactLimit>(&format!("{CEILINGS}\nbegin = 0.8"));
-    // Load as a multiple of the ceiling, and the rest of an approach of 0.5 m/s; 0.2 m/s are allowed at 0.8.
-    let cases = [(0.79, 0.5), (0.8, 0.2), (0.9, 0.1), (0.95, 0.05), (1.0, 0.0), (3.0, 0.0)];
-    for (times, passes) in cases {
-        // Spread over the pad, so that no tactel is near its own ceiling of 4 until the last case.
-        rig.set("image", Image::from_cells(2, &[(10.0 * times / 4.0) as f32; 4]));
-        rig.set("twist", twist([0.3, 0.0, 0.5, 0.0, 0.0, 0.2]));
+fn before_the_first_touch_no_corner_is_too_fast_and_the_direction_stays() {
+    let mut rig = rig::<ContactLimit>(CEILINGS);
+    for (cell, wanted) in [(0.0, [0.1, 0.0, 2.0, 10.0, -20.0, 0.3]), (-3.0, [0.0, 0.0, 3.0, 0.0, 0.0, 0.0])] {
+        rig.set("image", Image::from_cells(2, &[cell; 4]));
+        rig.set("twist", twist(wanted));
         rig.step();
         let out = get(&rig).unwrap();
-        assert!((out.0[2] - passes).abs() < 1e-6, "{times} of the ceiling: {out:?}");
-        assert!((rig.get::<Scalar>("force").unwrap() - passes / 0.5).abs() < 1e-6);
-        assert_eq!((out.0[0], out.0[5]), (0.3, 0.2), "the other components stay");
+        let fastest = |of: &Twist| of.0[2] + 0.01 * (of.0[3].abs() + of.0[4].abs());
+        assert!(
+            (after_braking(0.0, fastest(&out), 80.0, 0.002) - 4.0).abs() < 1e-9,
+            "{out:?}: one tactel is the first"
+        );
+        let scale = fastest(&out) / fastest(&twist(wanted));
+        assert!((out.0 - twist(wanted).0 * scale).amax() < 1e-12, "{out:?}");
+        assert!((rig.get::<Scalar>("force").unwrap() * rig.get::<Scalar>("peak").unwrap() - scale).abs() < 1e-12);
     }
+    let away = twist([3.0, 0.0, -2.0, 5.0, 0.0, 0.0]);
+    rig.set("twist", away);
+    rig.step();
+    assert_eq!(get(&rig), Some(away), "the way out is free");
+}
+
+#[test]
+fn an_approach_that_cannot_stop_is_refused_with_the_largest_that_can() {
+    let pad = ImageShape { rows: 16, cols: 16, pitch: [0.005; 2], unit: Unit::NEWTON };
+    let wires: [(&str, Shape); 2] = [("twist", TwistShape.into()), ("image", pad.into())];
+    let usual = "force_n = 15.0\npeak_n = 3.0\ndeceleration_m_per_s2 = 2.0\n";
+    let params = |more: &str| format!("{usual}{more}");
+    let refused = |more: &str| NodeRig::new::<ContactLimit>(&params(more), &wires).err();
+    // 76.8 kN/m under the whole pad, and two periods of 1 ms: v 0.002 + v²/4 = 15 / 76,800.
+    let mistakes = refused("approach_m_per_s = 0.05").unwrap();
+    assert_eq!(
+        mistakes[0].help.as_deref().unwrap(),
+        "write at most `approach_m_per_s = 0.02423`, or leave it out: the largest speed is then found"
+    );
+    assert!(
+        mistakes[0].message.starts_with("an approach at 0.05 m/s cannot stop below `force_n = 15`"),
+        "{mistakes:?}"
+    );
+    assert!(refused("approach_m_per_s = 0.02423").is_none());
+    assert!(refused("approach_m_per_s = 0.02424").is_some());
+    // A soft object gives way: 2 kN/m in series.
+    assert!(refused("approach_m_per_s = 0.05\nobject_n_per_m = 2000.0").is_none());
+    assert!(refused("").is_none());
 }
 
 #[test]

@@ -65,7 +65,9 @@ impl ArmModel {
     /// # Errors
     /// If the path of the model cannot be stated.
     pub fn facts(&self, loaded: &LoadedArm) -> Result<Facts, Mistakes> {
-        arm::facts(&self.urdf, &self.tip, Some(self.home.as_deref().unwrap_or(&loaded.start)))
+        let mut facts = arm::facts(&self.urdf, &self.tip, Some(self.home.as_deref().unwrap_or(&loaded.start)))?;
+        facts.push(("joint_n_m_per_rad".into(), self.stiffness.into()));
+        Ok(facts)
     }
 
     /// Returns the arm at rest in its first posture.

@@ -54,6 +54,12 @@ impl Foam {
 }
 
 impl Foam {
+    /// Returns the stiffness under a light load, of an area of 1 m² [N/m³].
+    #[must_use]
+    pub(super) fn per_area(&self) -> f64 {
+        self.stiffness / REFERENCE_AREA
+    }
+
     /// Returns the slope of the force under a tactel of 5 mm by 5 mm at a compression of `c` [m], in N/m.
     #[must_use]
     pub(super) fn slope(&self, c: f64) -> f64 {

@@ -97,6 +97,7 @@ impl PadModel {
         let Electronics { common_noise, own_noise, .. } = self.electronics;
         facts.push(pad::mount(mount));
         facts.extend([("common_noise".into(), common_noise.into()), ("own_noise".into(), own_noise.into())]);
+        facts.push(("foam_n_per_m3".into(), self.foam.per_area().into()));
         Ok(facts)
     }
 }

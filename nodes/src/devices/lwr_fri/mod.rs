@@ -176,7 +176,9 @@ fn opened(params: Params) -> Result<(Description, Fri), Mistakes> {
     let mut description = Description::every(params.sample_ms * 1e-3);
     description.on_silence(OnSilence::Stops, params.silence_ms * 1e-3);
     description.needs_commissioning = true;
-    let facts = arm::facts(&params.urdf, &params.tip, params.home.as_deref())?;
+    let mut facts = arm::facts(&params.urdf, &params.tip, params.home.as_deref())?;
+    let stiffest = stiffness.map(|joints| joints.into_iter().fold(0.0, f64::max));
+    facts.extend(stiffest.map(|stiffest| ("joint_n_m_per_rad".into(), stiffest.into())));
     let ports = ArmPorts::fill(&mut description, &shape, facts);
     let weight = ToolWeight::new(params.tool_mass, params.tool_com);
     let force = WrenchPorts::fill(&mut description, [vec![pad::mount(&Mount::NONE)], weight.facts()].concat());

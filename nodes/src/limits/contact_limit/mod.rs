@@ -2,22 +2,25 @@
 //!
 //! At the point (x, y) of the pad, with z pointing out of the pad toward the object, the pad approaches the object at
 //! vz + wx y - wy x. The point is the centre of gravity of the whole image for `force`, and the highest tactel for
-//! `peak`. The excess is subtracted from vz: a roll then goes on about the contact.
+//! `peak`. The excess is subtracted from vz: a roll then goes on about the contact. While nothing touches the pad, each
+//! corner can be the first that does, and the whole motion is scaled.
 
+mod ceiling;
 mod ceilings;
 mod gauge;
 mod load;
 
 use tactflow_runtime::node::{Describe, In, Inputs, Limits, Mistakes, Node, Out, Outputs, Param, Setup, Tick};
-use tactflow_runtime::signal::{Image, Scalar, Twist};
+use tactflow_runtime::signal::{Image, Jacobian, Pose, Scalar, Twist};
 
 use super::fraction;
 use crate::motion::bounds::countable;
 use crate::usual::{USUAL_FORCE_N, USUAL_M_PER_S, USUAL_PEAK_N};
 
+pub use ceiling::Ceiling;
+pub(super) use gauge::Gauge;
 pub use gauge::Reading;
-pub(super) use gauge::{Gauge, Pressed};
-pub use load::{PadLoad, load};
+pub use load::{PadLoad, centre, highest, load};
 
 /// Stops the motion into an object when the force or a single tactel reaches its ceiling.
 ///
@@ -26,15 +29,26 @@ pub use load::{PadLoad, load};
 /// the bench must say `allow_uncalibrated = true`. For an image of pressures no sum is a force: `calibrate` converts it
 /// to N.
 ///
-/// From the fraction `begin` of a ceiling on the approach is slowed down linearly, and at the ceiling it is zero. The way out is always
-/// free, and a roll goes on about the contact. The approach is the speed at the contact, vz + wx y - wy x with z
-/// pointing out of the pad: at the centre of gravity for `force`, and at the highest tactel for `peak`.
+/// The approach has room to brake at every load: it keeps its speed v for a time τ, slows down with the deceleration a,
+/// and is at rest before the load has grown to the ceiling. With the stiffness k of the contact this is
+/// k (v τ + v²/(2a)) = ceiling - load. τ is the age of the image and two periods of the graph, one until the next command
+/// and one until the arm follows. So a slow pad or a slow graph makes the approach slow, also before the first touch.
+/// The way out is always free.
+///
+/// For the sum, k is that of the foam under the whole pad, `foam_n_per_m3` times its area: a flat rigid object. With
+/// `object_n_per_m`, the stiffness of the stiffest object that the task touches, it is that of both in series. For a
+/// tactel, k is 8 times that of the foam under it, because foam stiffens. How much raw readings grow is not known. For
+/// them the ceiling is taken to be reached where an approach at `approach_m_per_s` from the first touch ends.
+///
+/// The approach is the speed at the contact, vz + wx y - wy x with z pointing out of the pad: at the centre of gravity
+/// for `force`, and at the highest tactel for `peak`. A roll goes on about the contact. While no tactel is above
+/// `threshold`, the approach is that of the fastest corner.
 ///
 /// It reads the whole image, because an object outside the selected region presses on the pad too. Negative tactels do
 /// not count. When the image is older than `max_age_ms` the output is absent: a blind sensor does not move.
 ///
-/// It does not predict the force that a stiff object adds while the motion brakes, which is about the stiffness times
-/// the braking distance. For hard objects use a lower `begin` or a lower `approach_m_per_s`.
+/// A compliant arm gives way. While a tactel is touched, k has the stiffness of the arm in series too: that of its joints, `joint_n_m_per_rad`, in the posture of `in.pose` and `in.jacobian`. Before the
+/// touch its mass counts and not its spring, so there it is taken as stiff. The hit of the mass itself is not counted.
 ///
 /// ```toml
 /// [nodes.contact_limit]
@@ -43,7 +57,7 @@ pub use load::{PadLoad, load};
 /// in.image = "calibrate.image"
 /// force_n = 15.0
 /// peak_n = 3.0
-/// approach_m_per_s = 0.05
+/// deceleration_m_per_s2 = 2.0
 /// ```
 #[derive(Describe)]
 #[describe(every_tick)]
@@ -66,12 +80,25 @@ pub struct Params {
     /// Ceiling of a single tactel of an image of raw readings.
     #[param(unit = "raw", above = 0.0)]
     peak_raw: Option<f64>,
-    /// Fraction of a ceiling at which the approach begins to slow down; with 1 it stops at the ceiling at once.
-    #[param(unit = "1", range = 0.0..=1.0, default = 0.5)]
-    begin: f64,
-    /// Maximum speed of the approach at `begin`.
+    /// Deceleration with which the sensor can stop.
+    #[param(unit = "m/s2", above = 0.0)]
+    deceleration_m_per_s2: f64,
+    /// Stiffness of the foam of the pad under a light load, of an area of 1 m².
+    #[param(unit = "N/m3", above = 0.0, default = 1.2e7)]
+    foam_n_per_m3: f64,
+    /// Stiffness of the stiffest object that the pad touches; a rigid one if not given.
+    #[param(unit = "N/m", above = 0.0)]
+    object_n_per_m: Option<f64>,
+    /// A tactel above this value counts as touched; a hundredth of the ceiling of a tactel if not given.
+    #[param(unit = "U", above = 0.0, from_bench)]
+    threshold: Option<f64>,
+    /// Stiffness of the joints of a compliant arm, the largest one; in N/m for prismatic joints. The arm is stiff if not
+    /// given.
+    #[param(unit = "N m/rad", above = 0.0)]
+    joint_n_m_per_rad: Option<f64>,
+    /// Maximum speed of the approach at any load. The graph does not load if it cannot stop below a ceiling.
     #[param(unit = "m/s", above = 0.0, usual = ..=USUAL_M_PER_S)]
-    approach_m_per_s: f64,
+    approach_m_per_s: Option<f64>,
     /// Maximum age of the image; five periods of the slowest device behind it if not given.
     #[param(unit = "ms", above = 0.0)]
     max_age_ms: Option<f64>,
@@ -86,6 +113,12 @@ pub struct Inputs<'a> {
     /// The whole calibrated image.
     #[port(unit = "U", frame = "A", quantity = "tactile_image", known, sampled)]
     image: In<'a, Image>,
+    /// Pose of the sensor in the base; it counts for a compliant arm.
+    #[port(frame = "A", reference = "B", quantity = "sensor_pose", known, sampled, optional)]
+    pose: Option<In<'a, Pose>>,
+    /// Spatial Jacobian of the sensor in the base; it counts for a compliant arm.
+    #[port(frame = "B", robot = "_", sampled, optional)]
+    jacobian: Option<In<'a, Jacobian>>,
 }
 
 /// What `contact_limit` writes.
@@ -118,7 +151,8 @@ impl Node for ContactLimit {
     };
 
     fn new(params: Params, setup: &mut Setup<Self>) -> Result<Self, Mistakes> {
-        let gauge = Gauge::new(&params, &setup.inputs.image, setup.sample_period("image"), &mut setup.warnings)?;
+        let periods = [setup.period, setup.sample_period("image")];
+        let gauge = Gauge::new(&params, &setup.inputs.image, periods, &mut setup.warnings)?;
         setup.is_uncalibrated = gauge.is_uncalibrated();
         (setup.outputs.force, setup.outputs.peak) = (fraction(), fraction());
         Ok(Self { gauge })
@@ -129,8 +163,11 @@ impl Node for ContactLimit {
             return;
         }
         let mut twist = countable(&inputs.twist);
-        let [sum, highest] = self.gauge.read(&inputs.image, state);
-        let [force, peak] = [sum, highest].map(|pressed| bar(&mut twist, pressed.point, pressed.allowed));
+        let arm = inputs.pose.as_deref().zip(inputs.jacobian.as_deref());
+        let [sum, highest] = self.gauge.read(&inputs.image, arm, tick, state);
+        let [force, peak] = [&sum, &highest].map(|pressed| {
+            bar(&mut twist, self.gauge.half(), pressed.allowed, || self.gauge.point(pressed, &inputs.image))
+        });
         out.twist.set(twist);
         // A NaN in the image makes the fraction NaN, which ends the run.
         out.force.set(force + 0.0 * sum.load);
@@ -138,21 +175,20 @@ impl Node for ContactLimit {
     }
 }
 
-/// Returns the speed that a load of `times` its ceiling allows toward the object [m/s], or `None` if it allows any.
+/// Limits the approach of a pad, whose `half` sizes are in m, to `allowed` [m/s]. Returns the fraction of the approach
+/// that passes.
 ///
-/// It falls linearly from `approach` [m/s], at the fraction `begin` of the ceiling, to 0 at the ceiling.
-#[must_use]
-pub fn allowed_speed(times: f64, begin: f64, approach: f64) -> Option<f64> {
-    if times < begin || times <= 0.0 {
-        return None;
-    }
-    Some(if times < 1.0 { approach * (1.0 - times) / (1.0 - begin) } else { 0.0 })
-}
-
-/// Limits the approach at a point of the pad to `allowed` [m/s]. Returns the fraction of the approach that passes.
-pub fn bar(twist: &mut Twist, [x, y]: [f64; 2], allowed: Option<f64>) -> f64 {
-    let Some(allowed) = allowed else { return 1.0 };
+/// Only if a corner is faster, `point` tells where the object presses [m]. Without a point the whole motion is scaled.
+pub fn bar(twist: &mut Twist, half: [f64; 2], allowed: f64, point: impl FnOnce() -> Option<[f64; 2]>) -> f64 {
     let [_, _, vz, wx, wy, _] = twist.0.into();
+    let fastest = vz + wx.abs() * half[1] + wy.abs() * half[0];
+    if fastest <= allowed {
+        return 1.0;
+    }
+    let Some([x, y]) = point() else {
+        twist.0 *= allowed / fastest;
+        return allowed / fastest;
+    };
     let speed = vz + wx * y - wy * x;
     if speed <= allowed {
         return 1.0;

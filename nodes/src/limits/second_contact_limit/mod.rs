@@ -11,9 +11,9 @@
 
 use nalgebra::{IsometryMatrix3, Vector3};
 use tactflow_runtime::node::{Describe, In, Inputs, Limits, Mistakes, Node, Out, Outputs, Setup, Tick};
-use tactflow_runtime::signal::{Image, Pose, Scalar, Twist};
+use tactflow_runtime::signal::{Image, Jacobian, Pose, Scalar, Twist};
 
-use super::contact_limit::{Gauge, Params, Pressed, Reading};
+use super::contact_limit::{Gauge, Params, Reading};
 use super::fraction;
 use crate::motion::bounds::countable;
 
@@ -52,7 +52,7 @@ const NEGLIGIBLE: f64 = 1e-9;
 /// in.image_pose = "state.sensor_pose"         # of the second pad, from an `arm_state` of its own
 /// force_n = 15.0
 /// peak_n = 3.0
-/// approach_m_per_s = 0.05
+/// deceleration_m_per_s2 = 2.0
 /// ```
 #[derive(Describe)]
 #[describe(every_tick)]
@@ -75,6 +75,9 @@ pub struct Inputs<'a> {
     /// Pose of the second pad in the base.
     #[port(frame = "C", reference = "B", quantity = "sensor_pose", known, sampled)]
     image_pose: In<'a, Pose>,
+    /// Spatial Jacobian of the second pad in the base; it counts for a compliant arm.
+    #[port(frame = "B", robot = "_", sampled, optional)]
+    jacobian: Option<In<'a, Jacobian>>,
 }
 
 /// What `second_contact_limit` writes.
@@ -107,7 +110,8 @@ impl Node for SecondContactLimit {
     };
 
     fn new(params: Params, setup: &mut Setup<Self>) -> Result<Self, Mistakes> {
-        let gauge = Gauge::new(&params, &setup.inputs.image, setup.sample_period("image"), &mut setup.warnings)?;
+        let periods = [setup.period, setup.sample_period("image")];
+        let gauge = Gauge::new(&params, &setup.inputs.image, periods, &mut setup.warnings)?;
         setup.is_uncalibrated = gauge.is_uncalibrated();
         (setup.outputs.force, setup.outputs.peak) = (fraction(), fraction());
         Ok(Self { gauge })
@@ -120,8 +124,11 @@ impl Node for SecondContactLimit {
         }
         let second = inputs.pose.0.inverse() * inputs.image_pose.0;
         let mut twist = countable(&inputs.twist);
-        let [sum, highest] = self.gauge.read(&inputs.image, state);
-        let [force, peak] = [sum, highest].map(|pressed| bar(&mut twist, &second, &pressed));
+        let arm = inputs.jacobian.as_deref().map(|jacobian| (&*inputs.image_pose, jacobian));
+        let [sum, highest] = self.gauge.read(&inputs.image, arm, tick, state);
+        let [force, peak] = [&sum, &highest].map(|pressed| {
+            bar(&mut twist, &second, self.gauge.half(), pressed.allowed, || self.gauge.point(pressed, &inputs.image))
+        });
         out.twist.set(twist);
         // A NaN in the image makes the fraction NaN, which ends the run.
         out.force.set(force + 0.0 * sum.load);
@@ -129,14 +136,30 @@ impl Node for SecondContactLimit {
     }
 }
 
-/// Limits the approach at a point of the second pad, whose pose in the frame of the twist is `second`. Returns the
-/// fraction of the approach that passes.
-fn bar(twist: &mut Twist, second: &IsometryMatrix3<f64>, pressed: &Pressed) -> f64 {
-    let Some(allowed) = pressed.allowed else { return 1.0 };
-    let [x, y] = pressed.point;
-    let normal = second.rotation * Vector3::z();
-    let point = second.rotation * Vector3::new(x, y, 0.0) + second.translation.vector;
-    let velocity = twist.linear() + twist.angular().cross(&point);
+/// Limits the approach of the second pad to `allowed` [m/s]. Its pose in the frame of the twist is `second`, and its
+/// `half` sizes are in m. Returns the fraction of the approach that passes.
+///
+/// Only if a corner is faster, `point` tells where the object presses [m]. Without a point the whole motion is scaled.
+fn bar(
+    twist: &mut Twist,
+    second: &IsometryMatrix3<f64>,
+    half: [f64; 2],
+    allowed: f64,
+    point: impl FnOnce() -> Option<[f64; 2]>,
+) -> f64 {
+    let [x_axis, y_axis, normal] = [Vector3::x(), Vector3::y(), Vector3::z()].map(|axis| second.rotation * axis);
+    let at = |point: &Vector3<f64>| twist.linear() + twist.angular().cross(point);
+    let turn = |axis: &Vector3<f64>| normal.dot(&twist.angular().cross(axis)).abs();
+    let fastest = normal.dot(&at(&second.translation.vector)) + turn(&x_axis) * half[0] + turn(&y_axis) * half[1];
+    if fastest <= allowed {
+        return 1.0;
+    }
+    let Some([x, y]) = point() else {
+        twist.0 *= allowed / fastest;
+        return allowed / fastest;
+    };
+    let point = x_axis * x + y_axis * y + second.translation.vector;
+    let velocity = at(&point);
     let speed = normal.dot(&velocity);
     if speed <= allowed {
         return 1.0;
