@@ -119,7 +119,7 @@ fn a_pose_that_no_sensor_measures_reaches_neither_a_limiter_nor_the_arm() {
             swapped += 1;
         }
     }
-    assert_eq!(swapped, 5 * 3, "lost, workspace, blind, adjoint and ik_sink, each with three poses");
+    assert_eq!(swapped, 6 * 3, "lost, contact, workspace, blind, adjoint and ik_sink, each with three poses");
 }
 
 #[test]

@@ -10,6 +10,7 @@ mod blind;
 mod calibrate;
 #[cfg(target_os = "linux")]
 mod calibrate_guided;
+mod ceilings;
 #[cfg(unix)]
 mod cell;
 mod cli;

@@ -48,13 +48,13 @@ fn a_finger_without_an_object_fails_alone() {
 #[test]
 fn two_arms_that_carry_a_box_stop_together() {
     let height = |engine: &Engine| *engine.get::<Scalar>("object.z").expect("the bench knows the box");
-    let lifted = run("carry.toml", &[], 6.0);
+    let lifted = run("carry.toml", &[], 8.0);
     assert!(parts(&lifted).iter().all(|task| task.mode() == Some("lift")));
     assert!((0.055..0.07).contains(&height(&lifted)), "{} m", height(&lifted));
     // A box that is too heavy slips through, and both arms notice that the contact moves or ends, or carry nothing up.
-    let heavy = run("carry.toml", &["devices.cell.object.mass=0.6"], 6.0);
+    let heavy = run("carry.toml", &["devices.cell.object.mass=0.6"], 8.0);
     assert!(height(&heavy) < 0.06, "{} m", height(&heavy));
-    let stopped = say(&["run", "graphs/carry.toml", "--for", "6s", "--send", "5s:left.stop"]);
+    let stopped = say(&["run", "graphs/carry.toml", "--for", "8s", "--send", "7s:left.stop"]);
     assert_eq!(stopped.code, 1, "{}", stopped.err);
     assert!(stopped.err.contains("task `right` has failed: ") && stopped.err.contains("`inputs.partner_carries`"));
     let page = "collisions between `left_arm`, `right_arm` are not checked";

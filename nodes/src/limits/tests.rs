@@ -200,8 +200,8 @@ fn an_approach_that_cannot_stop_is_refused_with_the_largest_that_can() {
     );
     assert!(refused("approach_m_per_s = 0.02423").is_none());
     assert!(refused("approach_m_per_s = 0.02424").is_some());
-    // A soft object gives way: 2 kN/m in series.
-    assert!(refused("approach_m_per_s = 0.05\nobject_n_per_m = 2000.0").is_none());
+    // A soft or small object gives way.
+    assert!(refused("approach_m_per_s = 0.05\ncontact_n_per_m = 2000.0").is_none());
     assert!(refused("").is_none());
 }
 

@@ -152,7 +152,7 @@ impl Gauge {
 /// Returns how much the sum of the image and its highest tactel grow on the way into an object [unit of the image per
 /// m].
 ///
-/// A calibrated image has the stiffness of the foam, in series with that of the stiffest object if it is given. How
+/// A calibrated image has the stiffness of the foam, or that of the stiffest contact if it is known and smaller. How
 /// much raw readings grow is not known: there the ceiling is reached where the approach from the first touch ends.
 fn stiffnesses(params: &Params, shape: &ImageShape, ceilings: &Ceilings, delay: f64) -> [f64; 2] {
     if shape.unit == Unit::RAW {
@@ -162,8 +162,7 @@ fn stiffnesses(params: &Params, shape: &ImageShape, ceilings: &Ceilings, delay: 
     }
     let tactel = params.foam_n_per_m3 * shape.pitch[0] * shape.pitch[1];
     let pad = tactel * (shape.rows * shape.cols) as f64;
-    let softness = params.object_n_per_m.map_or(0.0, f64::recip);
-    [pad, STIFFENING * tactel].map(|foam| (foam.recip() + softness).recip())
+    [pad, STIFFENING * tactel].map(|foam| params.contact_n_per_m.map_or(foam, |contact| contact.min(foam)))
 }
 
 /// Returns the sum of the squares of how fast the sensor moves along its z for each joint [m²].

@@ -35,8 +35,8 @@ pub use load::{PadLoad, centre, highest, load};
 /// and one until the arm follows. So a slow pad or a slow graph makes the approach slow, also before the first touch.
 /// The way out is always free.
 ///
-/// For the sum, k is that of the foam under the whole pad, `foam_n_per_m3` times its area: a flat rigid object. With
-/// `object_n_per_m`, the stiffness of the stiffest object that the task touches, it is that of both in series. For a
+/// For the sum, k is that of the foam under the whole pad, `foam_n_per_m3` times its area: a flat rigid object. If the
+/// cell has only small or soft objects, `contact_n_per_m` is the stiffness of the stiffest contact, with the foam. For a
 /// tactel, k is 8 times that of the foam under it, because foam stiffens. How much raw readings grow is not known. For
 /// them the ceiling is taken to be reached where an approach at `approach_m_per_s` from the first touch ends.
 ///
@@ -86,9 +86,9 @@ pub struct Params {
     /// Stiffness of the foam of the pad under a light load, of an area of 1 m².
     #[param(unit = "N/m3", above = 0.0, default = 1.2e7)]
     foam_n_per_m3: f64,
-    /// Stiffness of the stiffest object that the pad touches; a rigid one if not given.
+    /// Stiffness of the stiffest contact that the pad can make, with its foam; that of the foam alone if not given.
     #[param(unit = "N/m", above = 0.0)]
-    object_n_per_m: Option<f64>,
+    contact_n_per_m: Option<f64>,
     /// A tactel above this value counts as touched; a hundredth of the ceiling of a tactel if not given.
     #[param(unit = "U", above = 0.0, from_bench)]
     threshold: Option<f64>,

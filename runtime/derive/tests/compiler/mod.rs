@@ -68,7 +68,7 @@ fn program(case: &Path) -> PathBuf {
 
 fn compile(case: &Path) -> Output {
     Command::new(std::env::var_os("RUSTC").unwrap_or("rustc".into()))
-        .args(["--edition=2024", "--error-format=json", "--codegen=debuginfo=0"])
+        .args(["--edition=2024", "--error-format=json", "--codegen=debuginfo=0", "--allow=dead_code"])
         .arg(format!("--extern=tactflow_runtime={}", runtime().display()))
         .arg(format!("-Ldependency={}", built().display()))
         .arg("-o")
@@ -79,7 +79,7 @@ fn compile(case: &Path) -> Output {
 }
 
 /// What the compiler says of a case: each message once, with its places in the case and its notes.
-pub fn mistakes(case: &Path) -> String {
+pub(crate) fn mistakes(case: &Path) -> String {
     let output = compile(case);
     let lines = String::from_utf8(output.stderr).expect("the compiler writes UTF-8");
     let (mut said, mut seen) = (String::new(), BTreeSet::new());
@@ -125,7 +125,7 @@ fn marked(span: &Span) -> String {
 }
 
 /// Runs the program of a case that compiled.
-pub fn run(case: &Path) {
+pub(crate) fn run(case: &Path) {
     let status = Command::new(program(case)).status().expect("the program starts");
     assert!(status.success(), "{}: {status}", case.display());
 }

@@ -141,7 +141,10 @@ impl Second<'_> {
                 }
                 _ => None,
             };
-            block.push_str(&format!("\nin.{} = \"{}\"", input.name, port.unwrap_or_else(|| "?".into())));
+            // What need not be wired is left to the author.
+            if port.is_some() || input.need.must_be_wired {
+                block.push_str(&format!("\nin.{} = \"{}\"", input.name, port.unwrap_or_else(|| "?".into())));
+            }
         }
         let params = net.flat.nodes[self.guard.node].block.params.as_table();
         for (key, value) in params.into_iter().flat_map(|table| &table.entries) {

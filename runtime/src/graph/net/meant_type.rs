@@ -42,8 +42,11 @@ impl<'a> Candidate<'a> {
     /// Reports that the keys of the block do not fit its type, but those of only one other type.
     pub(super) fn wrong_type(&self, kind: &Spanned<String>, spec: &NodeSpec) -> Option<Diagnostic> {
         let Fit { unknown, missing } = self.fit(spec);
-        // Most often, a single key that does not fit is misspelt.
-        let is_clear = unknown.len() + missing >= 2 || (self.wires().next().is_none() && self.lacks_all_params(spec));
+        // Most often, a key that does not fit is misspelt.
+        let names = || spec.inputs.iter().map(|input| &*input.name).chain(spec.params.iter().map(|param| &*param.name));
+        let is_misspelt = |name: &&str| suggest_name(name, names()).is_some();
+        let is_clear = (unknown.len() + missing >= 2 && !unknown.iter().all(is_misspelt))
+            || (self.wires().next().is_none() && self.lacks_all_params(spec));
         let meant = if unknown.is_empty() { None } else { self.only_fitting() }?;
         let named = |spec: &NodeSpec| self.wires().filter(|name| has_input(spec, name)).count();
         if !is_clear && named(meant) <= named(spec) {
