@@ -43,7 +43,7 @@ impl<'a> Candidate<'a> {
     pub(super) fn wrong_type(&self, kind: &Spanned<String>, spec: &NodeSpec) -> Option<Diagnostic> {
         let Fit { unknown, missing } = self.fit(spec);
         // Most often, a key that does not fit is misspelt.
-        let names = || spec.inputs.iter().map(|input| &*input.name).chain(spec.params.iter().map(|param| &*param.name));
+        let names = || spec.inputs.iter().map(|input| &*input.name).chain(spec.params.iter().map(|param| param.name));
         let is_misspelt = |name: &&str| suggest_name(name, names()).is_some();
         let is_clear = (unknown.len() + missing >= 2 && !unknown.iter().all(is_misspelt))
             || (self.wires().next().is_none() && self.lacks_all_params(spec));
