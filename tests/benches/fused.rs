@@ -228,11 +228,12 @@ impl Fused {
         let load = contact_limit::load(image);
         let delay = 2.0 * tick.dt.max(0.1);
         let [force, peak] = CEILINGS;
+        let touches = load.peak > 3.0;
         contact_limit::bar(twist, half, force.allowed_speed(load.sum, delay), || {
-            (load.sum >= 0.1 * force.load).then(|| contact_limit::centre(shape, image))
+            touches.then(|| contact_limit::centre(shape, image))
         });
         contact_limit::bar(twist, half, peak.allowed_speed(load.peak, delay), || {
-            Some(contact_limit::highest(shape, image, load.peak))
+            touches.then(|| contact_limit::highest(shape, image, load.peak))
         });
     }
 

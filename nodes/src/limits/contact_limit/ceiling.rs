@@ -29,7 +29,8 @@ impl Ceiling {
     /// use tactflow_nodes::limits::contact_limit::Ceiling;
     ///
     /// let ceiling = Ceiling { load: 15.0, stiffness: 1000.0, deceleration: 2.0, approach: f64::INFINITY };
-    /// assert_eq!(ceiling.allowed_speed(0.0, 0.14), 0.1); // 14 mm in 0.14 s, and 2.5 mm to brake, are too far
+    /// // At 0.1 m/s the pad moves 12.5 mm before it brakes and 2.5 mm while it brakes: 15 N on a spring of 1 N/mm.
+    /// assert!((ceiling.allowed_speed(0.0, 0.125) - 0.1).abs() < 1e-12);
     /// ```
     #[must_use]
     pub fn allowed_speed(&self, load: f64, delay: f64) -> f64 {

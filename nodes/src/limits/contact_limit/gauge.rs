@@ -3,11 +3,11 @@
 use tactflow_runtime::node::{In, Mistakes, State, Tick, refuse_any};
 use tactflow_runtime::signal::{Image, ImageShape, Jacobian, Pose, Stamp, Unit};
 
-use super::super::lost_contact::along_z;
 use super::super::max_age;
 use super::ceiling::Ceiling;
 use super::ceilings::Ceilings;
 use super::{PadLoad, Params, centre, highest, load};
+use crate::motion::normal::along_z;
 
 /// Value of a tactel that counts as touched, as a fraction of its ceiling, if the threshold is not given [1].
 const DEFAULT_THRESHOLD: f64 = 0.01;

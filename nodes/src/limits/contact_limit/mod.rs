@@ -47,8 +47,9 @@ pub use load::{PadLoad, centre, highest, load};
 /// It reads the whole image, because an object outside the selected region presses on the pad too. Negative tactels do
 /// not count. When the image is older than `max_age_ms` the output is absent: a blind sensor does not move.
 ///
-/// A compliant arm gives way. While a tactel is touched, k has the stiffness of the arm in series too: that of its joints, `joint_n_m_per_rad`, in the posture of `in.pose` and `in.jacobian`. Before the
-/// touch its mass counts and not its spring, so there it is taken as stiff. The hit of the mass itself is not counted.
+/// A compliant arm gives way. While a tactel is touched, the arm is a spring in series with the foam. Its stiffness
+/// along z follows from that of the joints, `joint_n_m_per_rad`, in the posture of `in.pose` and `in.jacobian`. Before
+/// the touch the arm counts as stiff, because its mass presses first. The force of that hit is not computed.
 ///
 /// ```toml
 /// [nodes.contact_limit]
@@ -178,7 +179,9 @@ impl Node for ContactLimit {
 /// Limits the approach of a pad, whose `half` sizes are in m, to `allowed` [m/s]. Returns the fraction of the approach
 /// that passes.
 ///
-/// Only if a corner is faster, `point` tells where the object presses [m]. Without a point the whole motion is scaled.
+/// If no corner is faster than `allowed`, nothing changes, and `point` is not called. Otherwise `point` returns where the
+/// object presses on the pad [m], and the approach at that point is limited. If it returns `None`, the whole motion is
+/// scaled until no corner is too fast.
 pub fn bar(twist: &mut Twist, half: [f64; 2], allowed: f64, point: impl FnOnce() -> Option<[f64; 2]>) -> f64 {
     let [_, _, vz, wx, wy, _] = twist.0.into();
     let fastest = vz + wx.abs() * half[1] + wy.abs() * half[0];

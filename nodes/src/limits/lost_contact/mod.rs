@@ -12,7 +12,6 @@ use crate::motion::bounds::countable;
 use crate::usual::USUAL_M_PER_S;
 
 pub use course::{Course, Phase, Times};
-pub(in crate::limits) use lead::along_z;
 pub use lead::lead;
 
 /// Keeps the motion from pushing into the void when a contact is lost.

@@ -139,7 +139,9 @@ impl Node for SecondContactLimit {
 /// Limits the approach of the second pad to `allowed` [m/s]. Its pose in the frame of the twist is `second`, and its
 /// `half` sizes are in m. Returns the fraction of the approach that passes.
 ///
-/// Only if a corner is faster, `point` tells where the object presses [m]. Without a point the whole motion is scaled.
+/// If no corner is faster than `allowed`, nothing changes, and `point` is not called. Otherwise `point` returns where the
+/// object presses on the pad [m], and the approach at that point is limited. If it returns `None`, the whole motion is
+/// scaled until no corner is too fast.
 fn bar(
     twist: &mut Twist,
     second: &IsometryMatrix3<f64>,

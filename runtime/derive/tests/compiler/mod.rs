@@ -108,7 +108,7 @@ fn describe(message: &Message, case: &Path) -> String {
     // Which other types there are changes with the types of the runtime.
     for child in message.children.iter().filter(|child| !child.message.contains("other types implement trait")) {
         let first = child.message.lines().next().unwrap_or_default();
-        // A note that points at the runtime alone tells how it is written.
+        // A note whose places are all in the runtime is left out: it shows code that may change.
         let inside = child.spans.is_empty() || child.spans.iter().any(|span| Path::new(&span.file_name) == case);
         if inside {
             writeln!(text, "  {}: {first}", child.level).expect("written");
