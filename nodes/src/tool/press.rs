@@ -30,7 +30,7 @@ pub(super) struct PressArgs {
     #[arg(short, long, value_name = "FILE")]
     out: PathBuf,
     /// Serial number of the pad: `electronics.serial` of a `sim_bench`
-    #[arg(long, default_value_t = Electronics::DEFAULT.serial)]
+    #[arg(long, default_value_t = Electronics::default().serial)]
     serial: u64,
     /// Rows and columns of the pad
     #[arg(long, value_name = "ROWSxCOLS", value_parser = pair::<NonZeroUsize>, default_value = "16x16")]
@@ -66,7 +66,7 @@ pub(super) fn run(args: PressArgs, shell: &Shell) -> u8 {
 fn write(args: &PressArgs) -> std::io::Result<usize> {
     let [rows, cols] = args.size.map(NonZeroUsize::get);
     let tactels = rows * cols;
-    let mut readout = Readout::new(tactels, Electronics { serial: args.serial, ..Electronics::DEFAULT }, args.serial);
+    let mut readout = Readout::new(tactels, Electronics { serial: args.serial, ..Electronics::default() }, args.serial);
     let mut file = BufWriter::new(std::fs::File::create(&args.out)?);
     let names = (0..rows).flat_map(|i| (0..cols).map(move |j| format!(",t{i}_{j}")));
     writeln!(file, "time,force{}", names.collect::<String>())?;

@@ -37,7 +37,7 @@ pub struct Params {
     /// The port: `serial:/dev/serial/by-id/…`, or `tcp:HOST:PORT` for a server that passes on a serial port.
     link: String,
     /// The sensors that the bench uses, one for each pad.
-    #[param(default = vec![SensorParams::first()])]
+    #[param(default = vec![SensorParams::default()])]
     sensors: Vec<SensorParams>,
     /// Layouts of other sensors, by their names.
     #[param(default = Map(std::collections::BTreeMap::new()))]

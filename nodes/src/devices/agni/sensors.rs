@@ -10,6 +10,7 @@ use super::messages::{Config, SensorType, VERSION};
 
 /// A sensor of the device.
 #[derive(Debug, Clone, Param)]
+#[param(default)]
 pub(super) struct SensorParams {
     /// Name of the pad if the device has several, for the bench: `left_pad = "skin.left"`.
     side: Option<String>,
@@ -24,13 +25,6 @@ pub(super) struct SensorParams {
     /// bytes), or one of `layouts`.
     #[param(default = "myrmex_v2")]
     layout: String,
-}
-
-impl SensorParams {
-    /// The first Myrmex v2 of a device.
-    pub(super) fn first() -> Self {
-        Self { side: None, number: None, uid: None, layout: BUILTIN[0].to_owned() }
-    }
 }
 
 /// A pad of the bench.

@@ -76,7 +76,7 @@ pub struct Params {
     #[param(unit = "rad")]
     start: Option<Vec<f64>>,
     /// Bounds of the checks before the first command.
-    #[param(default = StartBounds::DEFAULT)]
+    #[param(default = StartBounds::default())]
     start_bounds: StartBounds,
     /// Time that the controller has to reach the state command after it has sent its first measurement. The arm rests
     /// meanwhile.

@@ -121,7 +121,7 @@ pub struct Params {
     #[param(unit = "rad")]
     start: Option<Vec<f64>>,
     /// Bounds of the checks before the first command.
-    #[param(default = StartBounds::DEFAULT)]
+    #[param(default = StartBounds::default())]
     start_bounds: StartBounds,
     /// Our address, as the robot sees it; that of our connection to the robot if not given.
     host: Option<String>,

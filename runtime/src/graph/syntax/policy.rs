@@ -2,7 +2,7 @@
 
 use super::read::read_word;
 use crate::node::{Map, Param, Reader, Spanned, Written};
-use crate::source::{Item, SourceMap, Table, Value};
+use crate::source::Value;
 
 /// The reaction to a trouble.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
@@ -147,6 +147,7 @@ pub(crate) struct RolePolicy {
 
 /// The section `[policy]`.
 #[derive(Debug, Clone, Param)]
+#[param(default)]
 pub(crate) struct PolicyTable {
     /// The newest sample of a role is too old.
     #[param(default = Policy::Hold)]
@@ -176,14 +177,6 @@ pub(crate) struct PolicyTable {
     /// Policies of individual roles.
     #[param(default = Map(std::collections::BTreeMap::new()))]
     pub(crate) roles: Map<RolePolicy>,
-}
-
-impl Default for PolicyTable {
-    fn default() -> Self {
-        let empty = Value { span: 0..0, item: Item::Table(Table::default()) };
-        let sources = SourceMap::default();
-        Self::read(&empty, &mut Reader::new(&sources)).expect("every policy has a default")
-    }
 }
 
 impl PolicyTable {
