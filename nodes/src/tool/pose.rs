@@ -53,17 +53,11 @@ fn list(text: &str) -> Result<Posture, String> {
     Ok(Posture(numbers.collect::<Result<_, _>>()?))
 }
 
-pub(super) fn run(args: PoseArgs, shell: &Shell) -> u8 {
-    match open_bench(shell.catalogue(), &args.bench) {
-        Err(report) => shell.reject(&report),
-        Ok(bench) => match describe(&args, shell, &bench) {
-            Ok(text) => {
-                shell.say(&text);
-                0
-            }
-            Err(message) => shell.refuse(message),
-        },
-    }
+pub(super) fn run(args: PoseArgs, shell: &Shell) -> Result<u8, u8> {
+    let bench = open_bench(shell.catalogue(), &args.bench).map_err(|report| shell.reject(&report))?;
+    let text = describe(&args, shell, &bench).map_err(|message| shell.refuse(message))?;
+    shell.say(&text);
+    Ok(0)
 }
 
 fn describe(args: &PoseArgs, shell: &Shell, bench: &OpenBench) -> Result<String, String> {
@@ -72,7 +66,7 @@ fn describe(args: &PoseArgs, shell: &Shell, bench: &OpenBench) -> Result<String,
     let chain = chain(shell.catalogue(), description, &bound)?;
     let joints = chain.joints();
     let home = description.fact_on(bound.side.as_deref(), "velocity_arm", "home");
-    let home = home.and_then(|home| home.as_array()).map(|home| home.iter().filter_map(number).collect::<Vec<_>>());
+    let home: Option<Vec<f64>> = home.and_then(|home| home.clone().try_into().ok());
     let (posture, origin) = match &args.at {
         Some(Posture(at)) => (in_radians(at, args.degrees, joints)?, "the given posture"),
         None => (home.ok_or("the arm has no `home`: name a posture with `--at`")?, "`home`"),
@@ -134,10 +128,6 @@ fn mounts(bench: &OpenBench, arm: &BoundRole) -> Vec<(String, IsometryMatrix3<f6
         Some((role.clone(), mount::stated(&device.opened.description, bound.side.as_deref())?.pose()))
     };
     bench.bind.iter().filter_map(mount).collect()
-}
-
-fn number(value: &toml::Value) -> Option<f64> {
-    value.as_float().or_else(|| value.as_integer().map(|integer| integer as f64))
 }
 
 /// Returns the positions in rad, one for each joint.

@@ -57,18 +57,12 @@ struct Sensor {
     tip: String,
 }
 
-pub(super) fn run(args: &ToolArgs, shell: &Shell) -> u8 {
-    let mut cell = match GuidedCell::open(shell, &args.bench) {
-        Ok(cell) => cell,
-        Err(code) => return code,
-    };
+pub(super) fn run(args: &ToolArgs, shell: &Shell) -> Result<u8, u8> {
+    let mut cell = GuidedCell::open(shell, &args.bench)?;
     let found = Sensor::find(&cell, args).and_then(|sensor| Ok((sensor, BenchFile::read(&args.bench)?)));
-    let (sensor, mut bench) = match found {
-        Ok(found) => found,
-        Err(message) => return shell.refuse(message),
-    };
+    let (sensor, mut bench) = found.map_err(|why| shell.refuse(why))?;
     let done = sensor.weigh(&mut cell).and_then(|found| conclude(&mut cell, &sensor, &found, &mut bench));
-    done.unwrap_or_else(|left| left.report(shell))
+    done.map_err(|left| left.report(shell))
 }
 
 impl Sensor {
@@ -80,7 +74,9 @@ impl Sensor {
             return Err(format!("`wrench` of device `{}` is not a force and a torque", bound.device));
         }
         let fact = |name: &str| description.fact_on(bound.side.as_deref(), "force_sensor", name);
-        let subtracted = fact("tool_mass").and_then(number).zip(fact("tool_com").and_then(vector));
+        let mass = fact("tool_mass").and_then(toml::Value::as_float);
+        let centre = fact("tool_com").and_then(|centre| centre.clone().try_into::<[f64; 3]>().ok());
+        let subtracted = mass.zip(centre.map(Vector3::from));
         let is_own = cell.port::<Joints>(&bound, "position").is_some();
         let own = is_own.then_some(&*bound.role);
         let arm = GuidedArm::find(cell, args.arm.as_deref().or(own))?;
@@ -147,15 +143,6 @@ fn params(cell: &GuidedCell<'_>, bench: &Path, device: &str) -> Result<toml::Tab
 
 fn has_six(shape: &FeaturesShape) -> bool {
     shape.names().count() == 6
-}
-
-fn number(fact: &toml::Value) -> Option<f64> {
-    fact.as_float()
-}
-
-fn vector(fact: &toml::Value) -> Option<Vector3<f64>> {
-    let list: Vec<f64> = fact.as_array()?.iter().map(number).collect::<Option<_>>()?;
-    Some(<[f64; 3]>::try_from(list).ok()?.into())
 }
 
 /// Describes a posture that was measured.

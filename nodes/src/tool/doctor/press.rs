@@ -68,11 +68,8 @@ impl PressArgs {
             return Ok(Severity::Fine);
         }
         let cell = GuidedCell::open(shell, bench)?;
-        let arm = match GuidedArm::find(&cell, self.arm.as_deref()) {
-            Ok(arm) => Some(arm),
-            Err(why) if self.arm.is_some() => return Err(shell.refuse(why)),
-            Err(_) => None,
-        };
+        let arm = GuidedArm::find(&cell, self.arm.as_deref());
+        let arm = arm.map(Some).or_else(|why| self.arm.as_ref().map_or(Ok(None), |_| Err(shell.refuse(why))))?;
         let mut dialogue = Dialogue { cell, arm, patience: self.patience };
         dialogue.examine(watched, devices).map_err(|left| match left {
             Left::Interrupted => {

@@ -4,7 +4,6 @@
 mod arm;
 mod bench_file;
 pub(super) mod mount;
-mod temporary;
 
 use std::io::BufRead;
 use std::path::Path;

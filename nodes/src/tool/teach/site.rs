@@ -98,8 +98,7 @@ fn arms(cell: &GuidedCell<'_>) -> usize {
 
 /// Reads a list of plain numbers.
 pub(super) fn read_numbers(value: &Value) -> Option<Vec<f64>> {
-    let number = |value: &Value| value.as_float().or_else(|| value.as_integer().map(|number| number as f64));
-    value.as_array()?.iter().map(number).collect()
+    value.clone().try_into().ok()
 }
 
 /// Returns the pads of a bench. A pad may be simulated, so the devices are opened once more, without a connection.
