@@ -101,7 +101,7 @@ impl Device for Player {
         let recording = recordings::read(&bytes, &file.path.to_string_lossy(), &hints)
             .map_err(|refusal| mistakes(refusal, file, &bytes))?;
         let mut description = Description::every(recording.period);
-        let image = pad::fill(&mut description, recording.shape.clone(), facts(&recording, &params));
+        let image = pad::fill(description.fills(pad::ROLE), recording.shape.clone(), facts(&recording, &params));
         Ok(Opened { description, driver: Driver::Stepped(Box::new(Self { image, recording, next: 0 })) })
     }
 }

@@ -8,11 +8,11 @@ use tactflow_runtime::device::{DeviceError, Link, Live, Output};
 use tactflow_runtime::signal::Image;
 use tokio::time::{Instant, sleep};
 
-use super::messages::{Counts, Frame, Message};
+use super::messages::{Frame, Message};
 use super::port::Port;
 use super::sensors::{Pad, assign};
 use super::session::{Identity, Session};
-use crate::devices::link::{Address, Backoff};
+use crate::devices::link::{Address, Backoff, Counts};
 
 /// The driver of a device.
 pub(super) struct Agni {

@@ -6,6 +6,8 @@
 
 use std::fmt;
 
+use crate::devices::link::Counts;
+
 /// The beginning of each message.
 const HEADER: [u8; 2] = [0xF0, 0xC4];
 
@@ -123,17 +125,6 @@ pub(super) struct Messages {
     /// Whether the last message ended where the next one begins.
     is_locked: bool,
     pub(super) counts: Counts,
-}
-
-/// What has been counted and is not reported yet.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
-pub(super) struct Counts {
-    /// Frames whose checksum is wrong.
-    pub(super) rejected: u64,
-    /// Times at which the beginning of a message was lost.
-    pub(super) resyncs: u64,
-    /// Bytes that belong to no message.
-    pub(super) skipped: u64,
 }
 
 /// What begins at the first byte that is not read.

@@ -183,10 +183,11 @@ impl Params {
         facts.push(pad::mount(&self.mount));
         let layout = &pad.layout;
         let shape = ImageShape { rows: layout.rows, cols: layout.cols, pitch: [self.pitch; 2], unit: Unit::ONE };
-        Ok(match &pad.side {
-            Some(side) => pad::fill_on(description, side.clone(), shape, facts),
-            None => pad::fill(description, shape, facts),
-        })
+        let fill = match &pad.side {
+            Some(side) => description.fills_on(side.clone(), pad::ROLE),
+            None => description.fills(pad::ROLE),
+        };
+        Ok(pad::fill(fill, shape, facts))
     }
 }
 

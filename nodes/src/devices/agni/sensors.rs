@@ -146,7 +146,7 @@ mod tests {
         let none = Map(std::collections::BTreeMap::new());
         let device = config(&[(7, 192), (8, 512), (9, 512), (10, 40)]);
         for (sensors, expected) in [
-            (vec![SensorParams::first()], Ok(vec![None, Some(0), None, None])),
+            (vec![SensorParams::default()], Ok(vec![None, Some(0), None, None])),
             (vec![sensor("a", Some(3), None, "myrmex_v2")], Ok(vec![None, None, Some(0), None])),
             (
                 // The second one names the sensor that the first one would take.
@@ -173,7 +173,7 @@ mod tests {
         let messages = |sensors| -> Vec<String> {
             pads(sensors, &none).unwrap_err().into_iter().map(|mistake| mistake.message).collect()
         };
-        let first = SensorParams::first;
+        let first = SensorParams::default;
         assert_eq!(
             messages(vec![first(), sensor("a", None, None, "glove")]),
             ["the device has several sensors, so the sensor 1 needs a `side`"]

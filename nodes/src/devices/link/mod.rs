@@ -22,6 +22,17 @@ use tcp::Tcp;
 use udp::Udp;
 use websocket::WebSocket;
 
+/// What the reader of a stream of bytes has counted and not reported yet.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub(crate) struct Counts {
+    /// Frames that were refused, such as for a wrong checksum.
+    pub(crate) rejected: u64,
+    /// Times at which the beginning of a frame was lost.
+    pub(crate) resyncs: u64,
+    /// Bytes that belong to no frame.
+    pub(crate) skipped: u64,
+}
+
 /// Longest time for a connection to be made.
 const CONNECT_TIME: Duration = Duration::from_secs(5);
 /// Longest time for bytes to be sent.

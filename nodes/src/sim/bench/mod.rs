@@ -144,9 +144,9 @@ impl Device for SimBench {
         check::check(&params, arm.joints.joints.len())?;
         let (period, latency) = (period_of(pad.rate_hz), nanos(pad.latency_s));
         let mut description = Description::every(period as f64 * 1e-9);
-        let image = pad::fill(&mut description, shape.clone(), pad.facts(&model.body.mount)?);
+        let image = pad::fill(description.fills(pad::ROLE), shape.clone(), pad.facts(&model.body.mount)?);
         let joints = arm.joints.joints.clone();
-        let ports = ArmPorts::fill(&mut description, &arm.joints, model.facts(&arm)?);
+        let ports = ArmPorts::fill(description.fills(arm::ROLE), &arm.joints, model.facts(&arm)?);
         let tactels = pad.tactels();
         let readout = Readout::new(tactels, pad.electronics.clone(), params.seed);
         let bench = Self {

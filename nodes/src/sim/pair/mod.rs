@@ -198,8 +198,8 @@ impl Params {
     ) -> Result<(Side, SimArm), Mistakes> {
         let pad = &self.pad;
         let times = [period_of(pad.rate_hz), nanos(pad.latency_s)];
-        let image = pad::fill_on(description, name, pad.shape(), pad.facts(&model.body.mount)?);
-        let arm = ArmPorts::fill_on(description, name, &loaded.joints, model.facts(&loaded)?);
+        let image = pad::fill(description.fills_on(name, pad::ROLE), pad.shape(), pad.facts(&model.body.mount)?);
+        let arm = ArmPorts::fill(description.fills_on(name, arm::ROLE), &loaded.joints, model.facts(&loaded)?);
         let tactels = pad.tactels();
         let readout = Readout::new(tactels, pad.electronics.clone(), self.seed).with_noise(noise);
         let joints = loaded.joints.joints.clone();

@@ -11,6 +11,7 @@ pub(crate) mod packets;
 pub(crate) mod replies;
 pub(crate) mod rule;
 
+pub(crate) use crate::devices::link::Counts;
 use std::ops::Range;
 
 use lines::Lines;
@@ -18,17 +19,6 @@ use marked::Marked;
 use messages::Messages;
 use packets::Packets;
 use replies::Replies;
-
-/// What framing has counted.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
-pub(crate) struct Counts {
-    /// Frames that were complete and wrong, or not where they should be.
-    pub(crate) rejected: u64,
-    /// How often the place of the frames was lost.
-    pub(crate) resyncs: u64,
-    /// Bytes that belong to no frame.
-    pub(crate) skipped: u64,
-}
 
 /// Finds the frames in a stream of bytes.
 #[derive(Clone)]
