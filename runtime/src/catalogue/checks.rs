@@ -45,11 +45,8 @@ pub(super) fn device(name: &str, table: &[ParamSpec], text: &str) -> Vec<String>
 fn params(name: &str, table: &[ParamSpec], outer: &mut Vec<&'static str>, path: &str, wrong: &mut Vec<String>) {
     let depth = outer.len();
     outer.extend(table.iter().map(|param| param.name));
-    for (i, param) in table.iter().enumerate() {
+    for param in table {
         let this = format!("parameter `{path}{}` of `{name}`", param.name);
-        if table[..i].iter().any(|other| other.name == param.name) {
-            wrong.push(format!("{this} exists twice, also in a table that is flattened"));
-        }
         if let Some(fault) = &param.fault {
             wrong.push(format!("the default of {this} is refused: {fault}"));
         }
