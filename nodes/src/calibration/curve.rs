@@ -42,6 +42,7 @@ pub struct Tactel {
 
 /// A curve from s, the reading beyond the offset, to a force.
 #[derive(Debug, Clone, PartialEq)]
+#[must_use]
 pub enum ForceCurve {
     /// A straight line without an end: f = gain s, also below zero.
     Linear {

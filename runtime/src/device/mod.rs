@@ -34,6 +34,7 @@ pub use silence::{OnSilence, Silence};
 
 /// The type of a role: the ports that a task reads, and the ports that it commands.
 #[derive(Debug, Clone, Default)]
+#[must_use]
 pub struct RoleType {
     /// Its name in the section `[roles]`.
     pub name: Cow<'static, str>,

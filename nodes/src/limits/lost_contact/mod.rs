@@ -192,7 +192,6 @@ pub struct Manner {
 }
 
 /// Returns what a phase leaves of the wanted motion.
-#[must_use]
 pub fn allowed(wanted: &Twist, phase: Phase, manner: &Manner) -> Twist {
     match phase {
         Phase::Free | Phase::Touched => *wanted,
@@ -216,7 +215,6 @@ pub fn approach(twist: &Twist, half: [f64; 2]) -> f64 {
 }
 
 /// Returns the motion without its part into the object: no corner of the pad moves into it.
-#[must_use]
 pub fn kept_out(twist: &Twist, half: [f64; 2]) -> Twist {
     let mut twist = *twist;
     twist.0[2] -= approach(&twist, half).max(0.0);
@@ -224,7 +222,6 @@ pub fn kept_out(twist: &Twist, half: [f64; 2]) -> Twist {
 }
 
 /// Returns the motion, scaled so that no corner of the pad is faster than `speed` [m/s] if one moves into the object.
-#[must_use]
 pub fn slowed_down(twist: &Twist, half: [f64; 2], speed: f64) -> Twist {
     if approach(twist, half) <= 0.0 {
         return *twist;
