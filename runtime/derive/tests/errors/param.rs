@@ -36,18 +36,6 @@ pub struct Params {
     no_value: f64,
 }
 
-/// A table with defaults.
-#[derive(Debug, Clone, Param)]
-#[param(default)]
-pub struct Defaults {
-    /// A field without one.
-    #[param(unit = "s")]
-    no_default: f64,
-    /// A table whose fields have attributes of their own.
-    #[param(flatten, live)]
-    not_alone: Params,
-}
-
 /// Not a table.
 #[derive(Debug, Clone, Param)]
 pub struct Tuple(f64);
