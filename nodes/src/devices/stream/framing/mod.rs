@@ -12,8 +12,8 @@ pub(crate) mod replies;
 pub(crate) mod rule;
 
 pub(crate) use crate::devices::link::Counts;
-use std::ops::Range;
 
+use bytes::{Buf, BytesMut};
 use lines::Lines;
 use marked::Marked;
 use messages::Messages;
@@ -96,37 +96,12 @@ impl Framer {
     }
 }
 
-/// Bytes that wait, with a position up to which they are done with.
-#[derive(Debug, Clone, Default)]
-struct Pending {
-    bytes: Vec<u8>,
-    start: usize,
-}
-
-impl Pending {
-    /// Adds bytes, and drops those that are done with.
-    fn push(&mut self, bytes: &[u8]) {
-        self.bytes.drain(..self.start);
-        self.start = 0;
-        self.bytes.extend_from_slice(bytes);
-    }
-
-    /// Takes the bytes up to the next `end`, without it. They stay where they are until the next push.
-    fn take_until(&mut self, end: u8) -> Option<Range<usize>> {
-        let length = self.bytes[self.start..].iter().position(|byte| *byte == end)?;
-        let taken = self.start..self.start + length;
-        self.start = taken.end + 1;
-        Some(taken)
-    }
-
-    fn rest(&self) -> &[u8] {
-        &self.bytes[self.start..]
-    }
-
-    fn clear(&mut self) {
-        self.bytes.clear();
-        self.start = 0;
-    }
+/// Takes the bytes up to the next `end`, without it.
+fn take_until(pending: &mut BytesMut, end: u8) -> Option<BytesMut> {
+    let length = pending.iter().position(|byte| *byte == end)?;
+    let taken = pending.split_to(length);
+    pending.advance(1);
+    Some(taken)
 }
 
 #[cfg(test)]
