@@ -29,7 +29,7 @@ pub use description::{Command, Description, Fill, Output, Report};
 pub use exchange::{Commands, Samples};
 pub(crate) use exchange::{PortSample, SampleState};
 pub use live::{Link, Live};
-pub(crate) use live::{LinkSetup, Linked, start};
+pub(crate) use live::{LinkSetup, Linked, start, wait};
 pub use silence::{OnSilence, Silence};
 
 /// The type of a role: the ports that a task reads, and the ports that it commands.
