@@ -40,7 +40,6 @@ use shell::{Colour, standard_error};
 
 /// The parser of arguments, for the commands of other crates.
 pub use clap;
-pub use explain::explanation;
 pub use reference::pages::reference;
 pub use run::{Commissioning, Job, JobOptions, Print, Proof, duration};
 pub use shell::command::{CommandEnd, OutputFormat, Subcommand, derived};

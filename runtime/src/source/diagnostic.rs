@@ -21,6 +21,12 @@ macro_rules! codes {
             pub const fn name(self) -> &'static str {
                 match self { $(Self::$Code => $name),* }
             }
+
+            /// Returns the page that explains it, in Markdown.
+            #[must_use]
+            pub const fn page(self) -> &'static str {
+                match self { $(Self::$Code => include_str!(concat!("../../../docs/errors/", $name, ".md"))),* }
+            }
         }
     };
 }
