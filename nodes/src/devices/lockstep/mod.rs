@@ -13,7 +13,7 @@ use std::time::Duration;
 use tactflow_runtime::device::{Description, Device, Driver, OnSilence, Opened, Output};
 use tactflow_runtime::node::{At, Describe, FilePath, Mistake, Mistakes, Param};
 use tactflow_runtime::signal::{Image, ImageShape, Joint, JointsShape, Unit};
-use tactflow_runtime::source::Code;
+use tactflow_runtime::source::{Code, quoted};
 
 use super::arm::{self, ArmPorts};
 use super::{Facts, pad};
@@ -202,6 +202,5 @@ fn model(name: &str) -> Option<FilePath> {
 
 /// Returns the names of the built-in models.
 fn models() -> String {
-    let names = builtin::FILES.iter().filter_map(|(file, _)| file.strip_suffix(".urdf"));
-    names.map(|name| format!("`{name}`")).collect::<Vec<_>>().join(", ")
+    quoted(builtin::FILES.iter().filter_map(|(file, _)| file.strip_suffix(".urdf")))
 }
