@@ -9,11 +9,12 @@ use tactflow_runtime::graph::open_bench;
 use tactflow_runtime::signal::{Features, FeaturesShape, Joints, Shape};
 
 use super::average::Average;
-use super::payload::{check_flange, millimetres, payload};
+use super::payload::{check_flange, payload};
 use crate::calibration::tool_weight::{
     MIN_POSTURES, MIN_SPREAD, WeightFit, WeightPosture, WeightUnfit, fit, next_side, side_down,
 };
 use crate::motion::weight::{GRAVITY, weight};
+use crate::tool::guided::vectors::three;
 use crate::tool::guided::{BenchFile, BoundRole, CellPort, GuidedArm, GuidedCell, Left, numbers};
 
 /// Weigh the tool: hold the arm still in four postures
@@ -165,14 +166,10 @@ fn progress(fitted: &Result<WeightFit, WeightUnfit>, count: usize) -> String {
 }
 
 fn lines_of(found: &WeightFit) -> String {
+    let [centre, deviation] = [found.centre, found.centre_deviation].map(|vector| three(&(vector * 1e3), 1));
     format!(
-        "mass {:.3} kg ± {:.3}, centre {} mm ± {}, residual {:.2} N and {:.3} N m",
-        found.mass,
-        found.mass_deviation,
-        millimetres(&found.centre),
-        millimetres(&found.centre_deviation),
-        found.force_residual,
-        found.torque_residual
+        "mass {:.3} kg ± {:.3}, centre {centre} mm ± {deviation}, residual {:.2} N and {:.3} N m",
+        found.mass, found.mass_deviation, found.force_residual, found.torque_residual
     )
 }
 
@@ -210,7 +207,7 @@ fn conclude(cell: &mut GuidedCell<'_>, sensor: &Sensor, found: &WeightFit, bench
             Ok(FAULTED)
         }
         Some((mass, centre)) => {
-            shell.say(&format!("the bench has mass {mass:.3} kg, centre {} mm", millimetres(&centre)));
+            shell.say(&format!("the bench has mass {mass:.3} kg, centre {} mm", three(&(centre * 1e3), 1)));
             write(cell, &sensor.bound, found, bench)
         }
     }

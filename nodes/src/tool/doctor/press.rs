@@ -13,6 +13,7 @@ use super::symmetry::CORNERS;
 use super::touch::{Event, Feeler, Touch};
 use super::{Finding, Severity, place, print};
 use crate::arm::mount::Mount;
+use crate::tool::guided::vectors::three;
 use crate::tool::guided::{BoundRole, CellPort, GuidedArm, GuidedCell, Left, mount};
 
 /// Time that a pad has for its first image [s].
@@ -231,8 +232,7 @@ impl Dialogue<'_> {
 /// Returns the place of a corner in the base, as text.
 fn at(corner: [f64; 2], pad: &Pad, pose: Option<&IsometryMatrix3<f64>>) -> String {
     pose.map_or_else(String::new, |pose| {
-        let [x, y, z] = place::point(place::corner(corner, &pad.shape), pose);
-        format!(", at [{x:.3}, {y:.3}, {z:.3}] m")
+        format!(", at {} m", three(&place::point(place::corner(corner, &pad.shape), pose).into(), 3))
     })
 }
 

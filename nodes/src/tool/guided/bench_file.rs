@@ -37,6 +37,14 @@ impl BenchFile {
         &self.path
     }
 
+    /// Returns the values of the file as it was read.
+    ///
+    /// # Errors
+    /// If it is no TOML.
+    pub(crate) fn values(&self) -> Result<toml::Value, String> {
+        toml::from_str(&self.before).map_err(|error| format!("cannot read `{}`: {error}", self.path.display()))
+    }
+
     /// Sets a key of a section: of `["devices", "arm"]` for `[devices.arm]`. A comment behind the old value stays.
     ///
     /// # Errors

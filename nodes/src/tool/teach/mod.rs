@@ -90,7 +90,7 @@ pub(super) fn run(args: TeachArgs, shell: &Shell) -> Result<u8, u8> {
     let refuse = |why: String| shell.refuse(why);
     let file = BenchFile::read(&args.bench).map_err(refuse)?;
     let mut cell = GuidedCell::open(shell, &args.bench)?;
-    let site = Site::find(&cell, &args.bench, args.arm.as_deref(), args.sensor.as_deref()).map_err(refuse)?;
+    let site = Site::find(&cell, &file, args.arm.as_deref(), args.sensor.as_deref()).map_err(refuse)?;
     let steps = [Step::Home, Step::Start, Step::Workspace, Step::KeepOut];
     let steps: Vec<Step> = steps.into_iter().filter(|step| args.only.is_empty() || args.only.contains(step)).collect();
     let mut dialogue = Dialogue::new(&mut cell, &site, [args.margin * 1e-3, args.clearance * 1e-3]);
