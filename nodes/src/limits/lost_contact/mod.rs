@@ -5,7 +5,9 @@ mod course;
 mod lead;
 
 use tactflow_runtime::node::{Describe, In, Inputs, Limits, Mistakes, Node, Out, Outputs, Param, Setup, State, Tick};
-use tactflow_runtime::signal::{Flag, Image, Jacobian, Joints, Pose, Scalar, ScalarShape, Stamp, Twist, Unit};
+use tactflow_runtime::signal::{
+    Flag, Image, ImageShape, Jacobian, Joints, Pose, Scalar, ScalarShape, Stamp, Twist, Unit,
+};
 
 use super::max_age;
 use crate::motion::bounds::countable;
@@ -138,9 +140,7 @@ impl Node for LostContact {
     };
 
     fn new(params: Params, setup: &mut Setup<Self>) -> Result<Self, Mistakes> {
-        let half = setup.inputs.image.as_ref().map_or([0.0; 2], |image| {
-            [image.cols as f64 * image.pitch[0] / 2.0, image.rows as f64 * image.pitch[1] / 2.0]
-        });
+        let half = setup.inputs.image.as_ref().map_or([0.0; 2], ImageShape::half);
         setup.outputs.lead = ScalarShape::of(Unit::METRE);
         let max_ages = ["contact", "image", "pose"].map(|input| max_age(params.max_age_ms, setup.sample_period(input)));
         let [debounce, wait] = [params.debounce_ms, params.wait_ms].map(|ms| (ms * 1e6) as i64);
