@@ -79,7 +79,6 @@ fn edge() -> Catalogue {
 }
 
 /// Everything there is: one line each.
-#[must_use]
 pub fn catalogue() -> Catalogue {
     edge()
         .group("touch: from a tactile image to features of the contact")

@@ -7,7 +7,6 @@ use tactflow_runtime::node::PortSpec;
 use tactflow_runtime::signal::Kind;
 
 /// An array of tactels.
-#[must_use]
 pub fn tactile_pad() -> RoleType {
     RoleType {
         name: "tactile_pad".into(),
@@ -21,7 +20,6 @@ pub fn tactile_pad() -> RoleType {
 }
 
 /// An arm that takes joint velocities.
-#[must_use]
 pub fn velocity_arm() -> RoleType {
     RoleType {
         name: "velocity_arm".into(),
@@ -41,7 +39,6 @@ pub fn velocity_arm() -> RoleType {
 
 /// An arm without a pad, which takes joint velocities. It has the ports of a [`velocity_arm`], so each device that fills
 /// that role fills this one.
-#[must_use]
 pub fn bare_arm() -> RoleType {
     let arm = velocity_arm();
     RoleType {
@@ -54,7 +51,6 @@ pub fn bare_arm() -> RoleType {
 }
 
 /// A sensor of the force and the torque on the tool of an arm.
-#[must_use]
 pub fn force_sensor() -> RoleType {
     let force = |name, doc| PortSpec::new(name, doc, Kind::Scalar, &["N", "self"]);
     let torque = |name, doc| PortSpec::new(name, doc, Kind::Scalar, &["N m", "self"]);
@@ -90,7 +86,6 @@ const WRENCH: &str = "The wrench that the environment exerts on the tool, about 
 
 /// Facts of the contact that a simulation knows and no sensor measures: for scenarios and the recorder. A device that
 /// fills it gives all of it, and says of what does not apply that it is absent.
-#[must_use]
 pub fn ground_truth() -> RoleType {
     let scalar = |name, doc, unit: &[&'static str]| PortSpec::new(name, doc, Kind::Scalar, unit);
     RoleType {
@@ -121,7 +116,6 @@ pub fn ground_truth() -> RoleType {
 
 /// Facts of a free object that a simulation knows and no sensor measures: for scenarios and the recorder. A bench binds
 /// it as `object`.
-#[must_use]
 pub fn true_object() -> RoleType {
     let scalar = |name, doc, unit: &[&'static str]| PortSpec::new(name, doc, Kind::Scalar, unit);
     RoleType {

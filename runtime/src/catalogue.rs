@@ -15,6 +15,7 @@ pub(crate) use limit_readers::LimitReaders;
 /// A list of node types, device types and roles. Catalogues can be joined, so that a crate can add its own to the
 /// shipped one.
 #[derive(Default)]
+#[must_use]
 pub struct Catalogue {
     /// The sort of entry behind each name.
     names: BTreeMap<String, &'static str>,
@@ -31,13 +32,11 @@ pub struct Catalogue {
 
 impl Catalogue {
     /// Creates an empty catalogue.
-    #[must_use]
     pub fn new() -> Self {
         Self::default()
     }
 
     /// Starts a group of nodes. Lists and the reference show its title above the nodes that follow.
-    #[must_use]
     pub fn group(mut self, title: &'static str) -> Self {
         self.groups.push((self.nodes.len(), title));
         self
@@ -47,7 +46,6 @@ impl Catalogue {
     ///
     /// # Panics
     /// As [`node_type`](Self::node_type).
-    #[must_use]
     #[track_caller]
     pub fn node<N: Node>(self) -> Self {
         self.node_type(of::<N>())
@@ -59,7 +57,6 @@ impl Catalogue {
     /// If the name is taken, or if the declaration is wrong: an unknown unit, a default outside its own range, two ports
     /// of one name, or an example that is of another type, sets an unknown parameter or leaves a required input unwired.
     /// The message lists everything that is wrong.
-    #[must_use]
     #[track_caller]
     pub fn node_type(mut self, node: Box<dyn NodeType>) -> Self {
         let spec = node.spec();
@@ -82,7 +79,6 @@ impl Catalogue {
     ///
     /// # Panics
     /// As [`node_type`](Self::node_type).
-    #[must_use]
     #[track_caller]
     pub fn device<D: Device>(self) -> Self {
         self.device_type(device_type::<D>())
@@ -92,7 +88,6 @@ impl Catalogue {
     ///
     /// # Panics
     /// As [`node_type`](Self::node_type).
-    #[must_use]
     #[track_caller]
     pub fn device_type(mut self, device: Box<dyn DeviceType>) -> Self {
         self.claim(&device.name(), "device");
@@ -105,7 +100,6 @@ impl Catalogue {
     ///
     /// # Panics
     /// If the name is taken.
-    #[must_use]
     #[track_caller]
     pub fn role(mut self, role: RoleType) -> Self {
         self.claim(&role.name, "role");
@@ -114,7 +108,6 @@ impl Catalogue {
     }
 
     /// Adds files that graphs can name as `builtin:NAME`.
-    #[must_use]
     pub fn files(mut self, files: &[BuiltinFile]) -> Self {
         self.files.extend(files);
         self
@@ -124,7 +117,6 @@ impl Catalogue {
     ///
     /// # Panics
     /// If a name is in both.
-    #[must_use]
     #[track_caller]
     pub fn join(mut self, other: Self) -> Self {
         let before = self.nodes.len();
@@ -200,7 +192,6 @@ impl Catalogue {
     }
 
     /// Returns the types of roles.
-    #[must_use]
     pub fn roles(&self) -> &[RoleType] {
         &self.roles
     }

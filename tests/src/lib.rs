@@ -36,7 +36,6 @@ pub fn single_tasks() -> Vec<PathBuf> {
 }
 
 /// A task that ships, on the bench whose pad and arm do as they are told.
-#[must_use]
 pub fn on_the_mock_bench(task: &str) -> Request {
     Request::file(workspace().join("graphs").join(task)).bench(workspace().join("graphs/benches/mock.toml"))
 }
@@ -55,7 +54,6 @@ pub fn toml_files(folder: &Path) -> Vec<PathBuf> {
 }
 
 /// Everything that ships, and the nodes of the tests.
-#[must_use]
 pub fn catalogue() -> Catalogue {
     tactflow_nodes::catalogue().join(nodes::catalogue()).join(devices::catalogue())
 }

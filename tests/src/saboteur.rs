@@ -35,7 +35,6 @@ pub struct Sabotage {
 }
 
 /// Returns the shipped catalogue with one type of node that fails.
-#[must_use]
 pub fn sabotaged(sabotage: &Sabotage) -> Catalogue {
     let sound: &'static Catalogue = Box::leak(Box::new(tactflow_nodes::catalogue()));
     let mut catalogue = Catalogue::new().files(sound.builtin_files());

@@ -114,7 +114,7 @@ const OF_ROLES: &[(&[Edit<'static>], &str, &str)] = &[
     (
         &[in_left_block("roles = { pad = 'left_pad', arm = 'left_arm' }\non_fail = 'stop'")],
         "bad-value",
-        "expected `part` or `run`",
+        "expected one of `part`, `run`",
     ),
     (
         &[in_left_block("roles = { pad = 'left_pad', arm = 'left_arm' }\non_fial = 'run'")],

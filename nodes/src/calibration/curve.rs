@@ -8,9 +8,10 @@ use std::fmt;
 
 #[cfg(feature = "cli")]
 use tactflow_runtime::cli::clap;
+use tactflow_runtime::node::Param;
 
 /// The kinds of curves.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Param)]
 #[cfg_attr(feature = "cli", derive(clap::ValueEnum))]
 pub enum CurveKind {
     /// f = gain s.
@@ -27,7 +28,7 @@ pub const KINDS: [CurveKind; 3] = [CurveKind::Linear, CurveKind::Rational, Curve
 impl fmt::Display for CurveKind {
     /// Writes the name in a file and on the command line.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.pad(["linear", "rational", "piecewise"][*self as usize])
+        f.pad(Self::CONTENTS.words[*self as usize].0)
     }
 }
 
@@ -42,6 +43,7 @@ pub struct Tactel {
 
 /// A curve from s, the reading beyond the offset, to a force.
 #[derive(Debug, Clone, PartialEq)]
+#[must_use]
 pub enum ForceCurve {
     /// A straight line without an end: f = gain s, also below zero.
     Linear {

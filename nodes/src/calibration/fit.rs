@@ -87,7 +87,6 @@ impl Points {
 
     /// Fits the straight line with the smallest error of the force; `sign` is 1 if readings rise with the force, else
     /// -1.
-    #[must_use]
     pub fn linear(&self, sign: f32) -> ForceCurve {
         let sum = |g: fn(&Point) -> f64| self.points.iter().map(|point| point.weight * g(point)).sum::<f64>();
         let slope = sum(|point| point.x * point.y) / sum(|point| point.y * point.y).max(1e-9);
@@ -95,7 +94,6 @@ impl Points {
     }
 
     /// Fits the rational curve y = x / (g + q x).
-    #[must_use]
     pub fn rational(&self, sign: f32) -> ForceCurve {
         let mut curve = self.first_guess();
         for _ in 0..5 {
@@ -172,7 +170,6 @@ impl Points {
     }
 
     /// Fits straight lines between knots.
-    #[must_use]
     pub fn piecewise(&self, sign: f32) -> ForceCurve {
         let knots = self.middle[1..].iter().map(|[x, y]| [(y * self.range) as f32 * sign, (x * self.most) as f32]);
         ForceCurve::Piecewise { knots: knots.collect() }

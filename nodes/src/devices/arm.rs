@@ -2,7 +2,7 @@
 
 #[cfg(feature = "drivers")]
 use tactflow_runtime::device::Link;
-use tactflow_runtime::device::{Command, Description, DeviceError, Fill, Output, Report, Samples};
+use tactflow_runtime::device::{Command, DeviceError, Fill, Output, Report, Samples};
 use tactflow_runtime::node::{At, FilePath, Mistake, Mistakes, refuse_any};
 use tactflow_runtime::signal::{Flag, FlagShape, Joint, Joints, JointsShape, Pose, Unit};
 use tactflow_runtime::source::Code;
@@ -21,25 +21,12 @@ pub(crate) struct ArmPorts {
     pub(crate) contact: Report<Pose>,
 }
 
-const ROLE: &str = "velocity_arm";
+/// The type of the role of an arm.
+pub(crate) const ROLE: &str = "velocity_arm";
 
 impl ArmPorts {
-    /// Adds the role `velocity_arm` to a description.
-    pub(crate) fn fill(description: &mut Description, joints: &JointsShape, facts: Facts) -> Self {
-        Self::state(description.fills(ROLE), joints, facts)
-    }
-
-    /// Adds the role `velocity_arm` on one side of a device to a description.
-    pub(crate) fn fill_on(
-        description: &mut Description,
-        side: &'static str,
-        joints: &JointsShape,
-        facts: Facts,
-    ) -> Self {
-        Self::state(description.fills_on(side, ROLE), joints, facts)
-    }
-
-    fn state(mut arm: Fill<'_>, joints: &JointsShape, facts: Facts) -> Self {
+    /// States what an arm gives and takes in its role.
+    pub(crate) fn fill(mut arm: Fill<'_>, joints: &JointsShape, facts: Facts) -> Self {
         arm.facts(facts);
         Self {
             position: arm.output("position", joints.clone()),

@@ -98,7 +98,7 @@ impl Device for MockArm {
         let period = period_of(params.rate_hz);
         let mut description = Description::every(period as f64 * 1e-9);
         let facts = arm::facts(&params.urdf, &params.tip, Some(params.home.as_deref().unwrap_or(&start)))?;
-        let ports = ArmPorts::fill(&mut description, &joints, facts);
+        let ports = ArmPorts::fill(description.fills(arm::ROLE), &joints, facts);
         let arm = Self::new(ports, joints.joints, start, params.hold, period);
         Ok(Opened { description, driver: Driver::Stepped(Box::new(arm)) })
     }
@@ -200,7 +200,7 @@ mod tests {
         };
         let params: Params = read(&format!("urdf = 'Cargo.toml'\ntip = ''\nstart = []\nhold = {holds}"));
         let mut description = Description::every(0.004);
-        let ports = ArmPorts::fill(&mut description, &JointsShape::default(), vec![]);
+        let ports = ArmPorts::fill(description.fills(arm::ROLE), &JointsShape::default(), vec![]);
         MockArm::new(ports, vec![joint("a"), joint("b")], vec![0.0, 0.5], params.hold, 4_000_000)
     }
 

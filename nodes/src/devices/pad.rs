@@ -2,30 +2,17 @@
 
 use std::borrow::Cow;
 
-use tactflow_runtime::device::{Description, Fill, Output};
+use tactflow_runtime::device::{Fill, Output};
 use tactflow_runtime::signal::{Image, ImageShape, Unit};
 
 use super::Facts;
 use crate::arm::mount::Mount;
 
-/// Adds the role `tactile_pad` to a description. Returns the handle of its image.
-pub(crate) fn fill(description: &mut Description, shape: ImageShape, facts: Facts) -> Output<Image> {
-    state(description.fills(ROLE), shape, facts)
-}
+/// The type of the role of a pad.
+pub(crate) const ROLE: &str = "tactile_pad";
 
-/// Adds the role `tactile_pad` on one side of a device to a description. Returns the handle of its image.
-pub(crate) fn fill_on(
-    description: &mut Description,
-    side: impl Into<Cow<'static, str>>,
-    shape: ImageShape,
-    facts: Facts,
-) -> Output<Image> {
-    state(description.fills_on(side, ROLE), shape, facts)
-}
-
-const ROLE: &str = "tactile_pad";
-
-fn state(mut pad: Fill<'_>, shape: ImageShape, facts: Facts) -> Output<Image> {
+/// States what a pad gives in its role. Returns the handle of its image.
+pub(crate) fn fill(mut pad: Fill<'_>, shape: ImageShape, facts: Facts) -> Output<Image> {
     pad.facts(facts);
     pad.output("image", shape)
 }

@@ -9,7 +9,7 @@ use std::sync::Arc;
 use tactflow_runtime::device::{Commands, Description, Device, DeviceError, Driver, Opened, Output, Samples, Stepped};
 use tactflow_runtime::node::{At, Describe, FilePath, Mistake, Mistakes, Param};
 use tactflow_runtime::signal::{Image, Unit};
-use tactflow_runtime::source::Code;
+use tactflow_runtime::source::{Code, quoted};
 
 use super::{Facts, pad};
 use crate::arm::mount::Mount;
@@ -101,7 +101,7 @@ impl Device for Player {
         let recording = recordings::read(&bytes, &file.path.to_string_lossy(), &hints)
             .map_err(|refusal| mistakes(refusal, file, &bytes))?;
         let mut description = Description::every(recording.period);
-        let image = pad::fill(&mut description, recording.shape.clone(), facts(&recording, &params));
+        let image = pad::fill(description.fills(pad::ROLE), recording.shape.clone(), facts(&recording, &params));
         Ok(Opened { description, driver: Driver::Stepped(Box::new(Self { image, recording, next: 0 })) })
     }
 }
@@ -109,9 +109,9 @@ impl Device for Player {
 fn hints(params: &Params) -> Result<Hints, Mistakes> {
     let is_known = |name: &String| recordings::FORMATS.iter().any(|format| format.name == name);
     if let Some(format) = params.format.as_ref().filter(|format| !is_known(format)) {
-        let names: Vec<String> = recordings::FORMATS.iter().map(|format| format!("`{}`", format.name)).collect();
+        let names = quoted(recordings::FORMATS.iter().map(|format| format.name));
         let mistake = Mistake::param("format", format!("unknown format `{format}`"));
-        return Err(mistake.help(format!("known formats are {}", names.join(", "))).into());
+        return Err(mistake.help(format!("known formats are {names}")).into());
     }
     Ok(Hints {
         assumed: None,

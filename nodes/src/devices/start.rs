@@ -17,6 +17,7 @@ const MAX_TARGET_ERROR_RAD: f64 = 1e-3;
 
 /// Bounds of the checks before the first command.
 #[derive(Debug, Clone, Param)]
+#[param(default)]
 pub struct StartBounds {
     /// Maximum difference between the measured and the commanded position of a joint.
     #[param(unit = "rad", above = 0.0, usual = 0.0..=USUAL_RAD, default = 0.05)]
@@ -30,11 +31,6 @@ pub struct StartBounds {
     /// Maximum difference between the position of a joint and `start` when a run begins.
     #[param(unit = "rad", above = 0.0, usual = 0.0..=USUAL_RAD, default = 0.1)]
     pub posture: f64,
-}
-
-impl StartBounds {
-    /// 0.05 rad, 2 mm and 1°, and 0.1 rad from `start`.
-    pub const DEFAULT: Self = Self { deflection: 0.05, tip: 0.002, tip_angle: 0.0175, posture: 0.1 };
 }
 
 /// What a controller reports of a still arm, and what the driver would command.
@@ -165,7 +161,7 @@ mod tests {
     fn check() -> StartCheck {
         let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../graphs/robots/ur5e.urdf").into();
         let chain = load(&FilePath { path, span: 0..0, builtin: None }, "tool0", &Mount::NONE).unwrap();
-        StartCheck::new(chain, StartBounds::DEFAULT, Some(HOME.to_vec()))
+        StartCheck::new(chain, StartBounds::default(), Some(HOME.to_vec()))
     }
 
     fn tip(check: &StartCheck) -> IsometryMatrix3<f64> {

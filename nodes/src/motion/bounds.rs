@@ -10,7 +10,6 @@ const MAX_COMPONENT: f64 = 1e100;
 const NEGLIGIBLE: f64 = 1e-9;
 
 /// Returns the twist with every component within the largest one that limiters compute with.
-#[must_use]
 pub fn countable(twist: &Twist) -> Twist {
     // `clamp` keeps a value that is not a number, which ends the run at the port that wrote it.
     Twist(twist.0.map(|v| v.clamp(-MAX_COMPONENT, MAX_COMPONENT)))

@@ -8,6 +8,8 @@
 //!
 //! A file may have several pads, as the two insoles of a pair: the bench selects one with `pad`. There is no default.
 
+use tactflow_runtime::source::quoted;
+
 use crate::recordings::common::fields::Fields;
 use crate::recordings::common::reel::{Properties, Reel, bounded};
 use crate::recordings::common::text::{Lines, Piece, shortened};
@@ -93,7 +95,7 @@ fn choose<'t>(text: &'t str, hints: &Hints) -> Result<Option<&'t str>, Refusal> 
             names.push(line.value.text);
         }
     }
-    let list = || names.iter().map(|name| format!("`{}`", shortened(name))).collect::<Vec<_>>().join(", ");
+    let list = || quoted(names.iter().map(|name| shortened(name)));
     let Some(wanted) = &hints.pad else {
         return match *names {
             [] => Ok(None),

@@ -76,7 +76,6 @@ impl Node for Adjoint {
 /// let roll = Twist::new(Vector3::zeros(), Vector3::new(0.0, 0.3, 0.0));
 /// assert!((adjoint(&pose, &roll).linear().norm() - 0.20).abs() < 0.005);
 /// ```
-#[must_use]
 pub fn adjoint(pose: &Pose, twist: &Twist) -> Twist {
     let rotation = pose.0.rotation.matrix();
     let angular: Vector3<f64> = rotation * twist.angular();

@@ -1,6 +1,6 @@
 //! The model of a simulated arm: its kinematics, and the springs and dampers of its joints.
 
-use tactflow_runtime::node::{At, FilePath, Mistake, Mistakes};
+use tactflow_runtime::node::{At, FilePath, Mistake, Mistakes, Param};
 use tactflow_runtime::signal::JointsShape;
 use tactflow_runtime::source::Code;
 
@@ -15,27 +15,43 @@ use crate::devices::{Facts, arm};
 const INERTIA: [f64; 7] = [2.0, 2.0, 1.0, 0.8, 0.3, 0.25, 0.1];
 
 /// The parameters of a simulated arm.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Param)]
 pub struct ArmModel {
-    /// Model of the kinematics.
+    /// Model of the arm.
     pub urdf: FilePath,
     /// Link that carries the sensor.
     pub tip: String,
+    /// All but its model.
+    #[param(flatten)]
+    pub body: ArmBody,
+}
+
+/// The parameters of a simulated arm beside its model.
+#[derive(Debug, Clone, Param)]
+pub struct ArmBody {
     /// Pose of the sensor on that link.
+    #[param(default = Mount::NONE)]
     pub mount: Mount,
-    /// Posture that the arm prefers [rad; m for a prismatic joint].
+    /// Posture that an arm prefers, stated as a fact; in m for a prismatic joint.
+    #[param(unit = "rad")]
     pub home: Option<Vec<f64>>,
-    /// Posture at the start [rad; m for a prismatic joint]; `home` if not given.
+    /// Joint positions at the start, one per joint; `home` if not given.
+    #[param(unit = "rad")]
     pub start: Option<Vec<f64>>,
-    /// Stiffness of the joints [N m/rad].
+    /// Stiffness of the joints.
+    #[param(unit = "N m/rad", above = 0.0, default = 200.0)]
     pub stiffness: f64,
-    /// Damping of the joints as a fraction of the critical one [1].
+    /// Damping of the joints as a fraction of the critical one.
+    #[param(unit = "1", range = 0.0.., default = 0.2)]
     pub damping_ratio: f64,
-    /// Inertia of each joint [kg m²]; that of an LWR if not given.
+    /// Inertia of each joint; that of the seven joints of an LWR if not given.
+    #[param(unit = "kg m2")]
     pub inertia: Option<Vec<f64>>,
-    /// Dry friction of the joints [N m].
+    /// Dry friction of the joints.
+    #[param(unit = "N m", range = 0.0.., default = 0.1)]
     pub friction: f64,
-    /// Largest acceleration that the arm states for each joint [rad/s²].
+    /// Largest acceleration that an arm states for each joint.
+    #[param(unit = "rad/s2", above = 0.0, default = 10.0)]
     pub acceleration: f64,
 }
 
@@ -53,10 +69,10 @@ impl ArmModel {
     /// # Errors
     /// If the model cannot be read, or if the arm cannot start where it should.
     pub fn load(&self) -> Result<LoadedArm, Mistakes> {
-        let chain = load(&self.urdf, &self.tip, &self.mount)?;
-        self.home.as_ref().map_or(Ok(()), |home| arm::check_posture("home", home, chain.joints()))?;
-        let start = arm::start_of(self.start.as_deref(), self.home.as_deref())?;
-        let joints = arm::joints(&chain, self.acceleration, &start)?;
+        let chain = load(&self.urdf, &self.tip, &self.body.mount)?;
+        self.body.home.as_ref().map_or(Ok(()), |home| arm::check_posture("home", home, chain.joints()))?;
+        let start = arm::start_of(self.body.start.as_deref(), self.body.home.as_deref())?;
+        let joints = arm::joints(&chain, self.body.acceleration, &start)?;
         Ok(LoadedArm { chain, start, joints })
     }
 
@@ -65,8 +81,8 @@ impl ArmModel {
     /// # Errors
     /// If the path of the model cannot be stated.
     pub fn facts(&self, loaded: &LoadedArm) -> Result<Facts, Mistakes> {
-        let mut facts = arm::facts(&self.urdf, &self.tip, Some(self.home.as_deref().unwrap_or(&loaded.start)))?;
-        facts.push(("joint_n_m_per_rad".into(), self.stiffness.into()));
+        let mut facts = arm::facts(&self.urdf, &self.tip, Some(self.body.home.as_deref().unwrap_or(&loaded.start)))?;
+        facts.push(("joint_n_m_per_rad".into(), self.body.stiffness.into()));
         Ok(facts)
     }
 
@@ -74,23 +90,23 @@ impl ArmModel {
     #[must_use]
     pub fn arm(&self, loaded: LoadedArm) -> SimArm {
         let joint = |inertia: f64| JointDynamics {
-            stiffness: self.stiffness,
-            damping_ratio: self.damping_ratio,
+            stiffness: self.body.stiffness,
+            damping_ratio: self.body.damping_ratio,
             inertia,
-            friction: self.friction,
+            friction: self.body.friction,
         };
         SimArm::new(loaded.chain, self.inertia().iter().copied().map(joint).collect(), loaded.start)
     }
 
     fn inertia(&self) -> &[f64] {
-        self.inertia.as_deref().unwrap_or(&INERTIA)
+        self.body.inertia.as_deref().unwrap_or(&INERTIA)
     }
 
     /// Returns the mistakes in the inertia of an arm of so many joints.
     #[must_use]
     pub fn check_inertia(&self, joints: usize) -> Mistakes {
         let mut mistakes = Mistakes::new();
-        if let Some(inertia) = &self.inertia {
+        if let Some(inertia) = &self.body.inertia {
             if inertia.len() != joints {
                 let message = format!("`inertia` has {} entries, but the arm has {joints} joints", inertia.len());
                 mistakes.push(Mistake::param("inertia", message));
@@ -109,11 +125,11 @@ impl ArmModel {
     #[must_use]
     pub fn check_motion(&self, dt: f64) -> Mistakes {
         let min_inertia = self.inertia().iter().copied().fold(f64::INFINITY, f64::min);
-        let rate = self.stiffness / min_inertia;
+        let rate = self.body.stiffness / min_inertia;
         let parts = [
             ("stiffness", rate, 0.0),
-            ("damping_ratio", 0.0, 2.0 * self.damping_ratio * rate.sqrt()),
-            ("friction", self.friction / MAX_STRAIN / min_inertia, 0.0),
+            ("damping_ratio", 0.0, 2.0 * self.body.damping_ratio * rate.sqrt()),
+            ("friction", self.body.friction / MAX_STRAIN / min_inertia, 0.0),
         ];
         let unresolved = parts.iter().filter(|(_, stiffness, damping)| !is_resolved(*stiffness, *damping, dt));
         let mistake = |name: &str| {

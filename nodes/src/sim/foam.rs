@@ -6,8 +6,9 @@
 
 use tactflow_runtime::node::Param;
 
-/// Properties of the foam.
+/// Properties of the foam. The defaults are those of the pad of the paper, as far as its properties are known.
 #[derive(Debug, Clone, Param)]
+#[param(default)]
 pub struct Foam {
     /// Stiffness of the foam under a tactel of 5 mm by 5 mm; it scales with the area of a tactel.
     #[param(unit = "N/m", above = 0.0, default = 300.0)]
@@ -36,21 +37,6 @@ pub struct Foam {
     /// Coefficient of sliding friction.
     #[param(unit = "1", range = 0.0.., default = 0.3)]
     pub(crate) sliding_friction: f64,
-}
-
-impl Foam {
-    /// The pad of the paper, as far as its properties are known.
-    pub const DEFAULT: Self = Self {
-        stiffness: 300.0,
-        stiffens_from: 0.0025,
-        stiffening: 9.6e7,
-        thickness: 0.008,
-        damping: 1.5,
-        shear: 200.0,
-        spread: 0.003,
-        static_friction: 0.4,
-        sliding_friction: 0.3,
-    };
 }
 
 impl Foam {
@@ -144,20 +130,20 @@ mod tests {
 
     #[test]
     fn a_column_is_a_stiffening_spring() {
-        let column = FoamColumn::new(&Foam::DEFAULT, 0.005 * 0.005);
+        let column = FoamColumn::new(&Foam::default(), 0.005 * 0.005);
         let cases = [(0.001, 0.3), (0.0025, 0.75), (0.005, 1.5 + 9.6e7 * 0.0025f64.powi(3))];
         for (depth, force) in cases {
             assert!((column.force(depth, 0.0, 0.0) - force).abs() < 1e-12, "{depth}");
         }
         assert!((column.force(0.001, 0.01, 0.0) - 0.315).abs() < 1e-12, "damped");
         assert_eq!(column.force(0.001, -1.0, 0.0), 0.0, "the foam does not pull");
-        let quarter = FoamColumn::new(&Foam::DEFAULT, 0.0025 * 0.0025);
+        let quarter = FoamColumn::new(&Foam::default(), 0.0025 * 0.0025);
         assert!((quarter.force(0.004, 0.0, 0.0) * 4.0 - column.force(0.004, 0.0, 0.0)).abs() < 1e-12);
     }
 
     #[test]
     fn a_compliant_object_is_a_spring_in_series() {
-        let column = FoamColumn::new(&Foam::DEFAULT, 0.005 * 0.005);
+        let column = FoamColumn::new(&Foam::default(), 0.005 * 0.005);
         for stiffness in [50.0, 300.0, 1e4, 1e7] {
             for depth in [1e-4, 1e-3, 3e-3, 6e-3, 8e-3] {
                 let force = column.force(depth, 0.0, 1.0 / stiffness);

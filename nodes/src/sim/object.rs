@@ -122,18 +122,12 @@ impl Object {
         let home = start * Pose3::from_parts(at, pose3(&Pose(pose_of([0.0; 3], params.turn))).rotation);
         let in_base =
             |step: &ScriptedMove| ScriptedMove { by: (start.rotation * Vec3::from(step.by)).into(), ..step.clone() };
+        let softness = params.stiffness.map_or(0.0, |stiffness| 1.0 / stiffness);
         Ok(Self {
-            shape,
-            softness: params.stiffness.map_or(0.0, |stiffness| 1.0 / stiffness),
-            home,
             script: params.motion.iter().map(in_base).collect(),
             axis: start.rotation * Vec3::Z,
             mount: params.mount.map(|stiffness| (stiffness, params.mass)),
-            sag: Vec3::ZERO,
-            sag_speed: Vec3::ZERO,
-            pose: home,
-            velocity: Vec3::ZERO,
-            spin: Vec3::ZERO,
+            ..Self::free(shape, softness, home)
         })
     }
 

@@ -1,12 +1,13 @@
 //! The model of a simulated pad: its parameters, what the simulation supports of them, and its facts.
 
-use tactflow_runtime::node::{FilePath, Mistake, Mistakes};
+use tactflow_runtime::node::{FilePath, Mistake, Mistakes, Param};
 use tactflow_runtime::signal::{ImageShape, Unit};
 
 use super::foam::Foam;
 use super::readout::Electronics;
 use crate::arm::mount::Mount;
 use crate::devices::{Facts, arm, pad};
+use crate::usual::{USUAL_PRESSURE_N, USUAL_THRESHOLD_N};
 
 /// Largest number of tactels of a simulated pad.
 pub const MAX_TACTELS: usize = 128 * 128;
@@ -16,44 +17,69 @@ const MAX_POINTS: f64 = 4e6;
 const MAX_LATENCY_FRAMES: f64 = 1000.0;
 
 /// The parameters of a simulated pad.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Param)]
 pub struct PadModel {
-    /// Its tactels.
-    pub shape: ImageShape,
-    /// Largest distance between simulated points [m].
-    pub points_apart: f64,
+    /// Number of rows of a pad.
+    #[param(range = 1..=1_000_000, default = 16)]
+    rows: usize,
+    /// Number of columns of a pad.
+    #[param(range = 1..=1_000_000, default = 16)]
+    cols: usize,
+    /// Distance between the centres of neighbouring tactels, along x and along y.
+    #[param(unit = "m", above = 0.0, default = 0.005)]
+    pitch: f64,
     /// Frames per second.
+    #[param(unit = "1/s", range = 0.001..=1e6, default = 250.0)]
     pub rate_hz: f64,
-    /// Time from taking an image until it is available [s].
+    /// Time from taking an image until it is available.
+    #[param(unit = "s", range = 0.0.., default = 0.004)]
     pub latency_s: f64,
-    /// The foam.
-    pub foam: Foam,
-    /// The electronics.
-    pub electronics: Electronics,
-    /// Calibration file that the pad states.
-    pub calibration: Option<FilePath>,
-    /// Noise threshold that the pad states [N].
+    /// Calibration file of a pad, stated as a fact for `calibrate`.
+    calibration: Option<FilePath>,
+    /// Noise threshold that a pad states as a fact.
+    #[param(unit = "N", range = 0.0.., usual = ..=USUAL_THRESHOLD_N, default = 0.015)]
     pub threshold: f64,
-    /// Unit of pressure that the pad states [N per tactel].
-    pub pressure: f64,
+    /// Unit of pressure that a pad states as a fact: p = 1 in the paper.
+    #[param(unit = "N/tactel", above = 0.0, usual = ..=USUAL_PRESSURE_N, default = 0.1)]
+    pressure: f64,
+    /// Properties of the foam, with its friction on an object.
+    #[param(default = Foam::default())]
+    pub foam: Foam,
+    /// Largest distance between simulated points of a pad; a thin probe needs a smaller one than a ball.
+    #[param(unit = "m", above = 0.0, default = 0.001)]
+    pub points_apart: f64,
+    /// Properties of the electronics.
+    #[param(default = Electronics::default())]
+    pub electronics: Electronics,
 }
 
 impl PadModel {
     /// Returns the shape of an image in raw counts.
     #[must_use]
-    pub fn shape(rows: usize, cols: usize, pitch: f64) -> ImageShape {
-        ImageShape { rows, cols, pitch: [pitch; 2], unit: Unit::RAW }
+    pub const fn shape(&self) -> ImageShape {
+        ImageShape { rows: self.rows, cols: self.cols, pitch: [self.pitch; 2], unit: Unit::RAW }
+    }
+
+    /// Returns the number of tactels.
+    #[must_use]
+    pub const fn tactels(&self) -> usize {
+        self.rows * self.cols
+    }
+
+    /// Returns the area of a pad [m²].
+    #[must_use]
+    pub fn area(&self) -> f64 {
+        self.tactels() as f64 * self.pitch.powi(2)
     }
 
     /// Returns the mistakes in the parameters: what the simulation does not support.
     #[must_use]
     pub fn check(&self) -> Mistakes {
-        let Self { points_apart, foam, shape, .. } = self;
-        let (rows, cols, pitch) = (shape.rows, shape.cols, shape.pitch[0]);
-        let points = (pitch / points_apart).ceil().max(1.0).powi(2) * shape.tactels() as f64;
+        let Self { rows, cols, pitch, points_apart, foam, .. } = self;
+        let points = (pitch / points_apart).ceil().max(1.0).powi(2) * self.tactels() as f64;
         let limits = [
             (
-                shape.tactels() <= MAX_TACTELS,
+                self.tactels() <= MAX_TACTELS,
                 "rows",
                 format!("{rows} by {cols} tactels are more than the {MAX_TACTELS} that can be simulated"),
             ),

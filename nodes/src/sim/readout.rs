@@ -9,8 +9,9 @@ use tactflow_runtime::node::Param;
 
 use tactflow_runtime::random::Random;
 
-/// Properties of the electronics.
+/// Properties of the electronics. The defaults are those of the pad of the paper, as far as its properties are known.
 #[derive(Debug, Clone, Param)]
+#[param(default)]
 pub struct Electronics {
     /// Serial number of the hardware: the seed of the offsets and curves of its tactels.
     #[param(default = 1)]
@@ -39,21 +40,6 @@ pub struct Electronics {
     /// Standard deviation of the independent noise of each tactel.
     #[param(unit = "raw", range = 0.0.., default = 3.0)]
     pub(crate) own_noise: f64,
-}
-
-impl Electronics {
-    /// The pad of the paper, as far as its properties are known.
-    pub const DEFAULT: Self = Self {
-        serial: 1,
-        range: 3000.0,
-        squash: 3.0,
-        spread: 0.22,
-        hysteresis: 0.06,
-        creep: 0.03,
-        creep_s: 15.0,
-        common_noise: 0.036,
-        own_noise: 3.0,
-    };
 }
 
 /// Largest count of 12 bits.
@@ -156,7 +142,7 @@ mod tests {
             creep: 0.0,
             common_noise: 0.0,
             own_noise: 0.0,
-            ..Electronics::DEFAULT
+            ..Electronics::default()
         };
         change(&mut electronics);
         Readout::new(1, electronics, 1)
@@ -202,7 +188,7 @@ mod tests {
 
     #[test]
     fn the_noise_has_a_common_and_an_independent_part() {
-        let electronics = Electronics { spread: 0.0, hysteresis: 0.0, creep: 0.0, ..Electronics::DEFAULT };
+        let electronics = Electronics { spread: 0.0, hysteresis: 0.0, creep: 0.0, ..Electronics::default() };
         let mut readout = Readout::new(256, electronics, 3);
         let frames: Vec<Vec<f32>> = (0..2000)
             .map(|_| {
@@ -225,7 +211,7 @@ mod tests {
     #[test]
     fn the_serial_number_determines_the_offsets() {
         let counts = |serial, seed| {
-            let electronics = Electronics { serial, own_noise: 0.0, ..Electronics::DEFAULT };
+            let electronics = Electronics { serial, own_noise: 0.0, ..Electronics::default() };
             let mut counts = vec![0.0; 16];
             Readout::new(16, electronics, seed).read(0.004, &[0.0; 16], &mut counts);
             counts

@@ -31,7 +31,7 @@ fn pad(z: f64) -> BodyMotion {
 
 /// Returns foam without losses.
 fn lossless() -> Foam {
-    Foam { damping: 0.0, static_friction: 0.0, sliding_friction: 0.0, ..Foam::DEFAULT }
+    Foam { damping: 0.0, static_friction: 0.0, sliding_friction: 0.0, ..Foam::default() }
 }
 
 fn world(arm: SimArm, foam: Foam, things: &[ObjectParams], step: f64) -> World {
@@ -72,7 +72,7 @@ fn at_rest_the_prismatic_joint_and_the_foam_balance() {
         (mounted(2e4), 1.0 / (1.0 / foam + 1.0 / 2e4)),
     ];
     for (plane, stiffness) in cases {
-        let mut world = world(slide(joint), Foam::DEFAULT, &[plane], 0.001);
+        let mut world = world(slide(joint), Foam::default(), &[plane], 0.001);
         world.advance(1.0, &[0.01]);
         world.advance(4.0, &[0.0]);
         // K (0.01 - z) = k (z - 0.002)
@@ -113,9 +113,9 @@ fn energy_does_not_grow() {
     let soft = ObjectParams { stiffness: Some(150.0), ..ball(0.04, [0.0, 0.0, 0.043]) };
     let cases = [
         (slide(undamped), lossless(), soft.clone(), true),
-        (slide(undamped), Foam::DEFAULT, soft, false),
+        (slide(undamped), Foam::default(), soft, false),
         (lwr(0.0, 0.0), lossless(), tilted.clone(), true),
-        (lwr(0.2, 0.1), Foam::DEFAULT, tilted, false),
+        (lwr(0.2, 0.1), Foam::default(), tilted, false),
     ];
     for (case, (arm, foam, thing, is_lossless)) in cases.into_iter().enumerate() {
         let mut world = world(arm, foam, &[thing], 0.00025);
@@ -141,7 +141,7 @@ fn energy_does_not_grow() {
 #[test]
 fn the_result_does_not_depend_on_the_step() {
     let run = |step: f64| {
-        let mut world = world(lwr(0.2, 0.1), Foam::DEFAULT, &[ball(0.04, [0.01, -0.005, 0.042])], step);
+        let mut world = world(lwr(0.2, 0.1), Foam::default(), &[ball(0.04, [0.01, -0.005, 0.042])], step);
         let mut forces = Vec::new();
         for beat in 1..=500 {
             // Down, then sideways.
@@ -166,7 +166,7 @@ fn the_result_does_not_depend_on_the_step() {
 #[test]
 fn friction_stays_in_its_cone_and_sticks_and_slips() {
     let objects = [object(&thing(ShapeKind::Plane, [0.0, 0.0, 0.0]))];
-    let mut contact = Contact::new(shape(), Foam::DEFAULT, 0.001, 8);
+    let mut contact = Contact::new(shape(), Foam::default(), 0.001, 8);
     let normal = 256.0 * 0.3;
     let mut slid = 0.0;
     let mut at_rest: f64 = 0.0;
@@ -197,7 +197,7 @@ fn the_imprint_keeps_the_sum_and_the_centre_of_a_load() {
     let mut imprint = Imprint::new(&shape(), 5, 0.003);
     for (x, y) in [(0.0, 0.0), (0.0123, -0.0087), (0.038, 0.0), (-0.0385, 0.0385)] {
         let objects = [object(&ball(0.003, [x, y, 0.003]))];
-        let mut contact = Contact::new(shape(), Foam::DEFAULT, 0.001, 8);
+        let mut contact = Contact::new(shape(), Foam::default(), 0.001, 8);
         contact.step(0.001, &pad(0.002), &objects, &mut [Vec3::ZERO]);
         imprint.take(&contact.touching);
         let clean = &imprint.forces;

@@ -71,7 +71,7 @@ fn orientation(pad: &BodyMotion, objects: &[Object], shape: &ImageShape) -> Opti
         Some((pad.pose.inverse_transform_point(object.pose.transform_point(line.at)), along))
     });
     let (at, along) = lines.min_by(|(a, _), (b, _)| a.length().total_cmp(&b.length()))?;
-    let half = [shape.cols as f64 * shape.pitch[0] / 2.0, shape.rows as f64 * shape.pitch[1] / 2.0];
+    let half = shape.half();
     let is_under = at.x.abs() < half[0] && at.y.abs() < half[1];
     (is_under && along.truncate().length_squared() > 1e-6).then(|| wrap_axial(libm::atan2(along.y, along.x)))
 }

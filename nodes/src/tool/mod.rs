@@ -18,7 +18,6 @@ use tactflow_runtime::catalogue::Catalogue;
 use tactflow_runtime::cli::{Tool, derived};
 
 /// Returns the tool with all commands, for a catalogue that includes that of this crate.
-#[must_use]
 pub fn tool(catalogue: Catalogue) -> Tool {
     let tool = Tool::new(catalogue)
         .command(derived(features::features))

@@ -1,6 +1,6 @@
 //! `tactflow pads`: the pads whose descriptions ship.
 
-use tactflow_runtime::cli::{OutputFormat, Shell, clap};
+use tactflow_runtime::cli::{OutputFormat, Shell, clap, table};
 
 use crate::builtin::FILES;
 
@@ -57,7 +57,7 @@ pub(super) fn run(args: PadsArgs, shell: &Shell) -> u8 {
         let message = format!("no pad matches `{}`\nhelp: `tactflow pads` prints all", args.words.join(" "));
         return shell.refuse(message);
     } else {
-        shell.say(&table(&pads));
+        shell.say(table(&rows(&pads), 0, 0).trim_end());
     }
     if pads.is_empty() { 2 } else { 0 }
 }
@@ -69,8 +69,7 @@ fn pad(name: &str, bytes: &[u8]) -> Option<Pad> {
     let file: toml::Table = text.parse().ok()?;
     let sensor = file.get("sensor")?.as_table()?;
     let shape = sensor.get("shape")?.as_array()?.iter().filter_map(toml::Value::as_integer).collect();
-    let rate = sensor.get("rate_hz")?;
-    let rate_hz = rate.as_float().or_else(|| rate.as_integer().map(|rate| rate as f64))?;
+    let rate_hz = sensor.get("rate_hz")?.clone().try_into().ok()?;
     let link = match sensor.get("baud").and_then(toml::Value::as_integer) {
         Some(baud) => format!("serial, {baud} baud"),
         None => "network".to_owned(),
@@ -79,19 +78,12 @@ fn pad(name: &str, bytes: &[u8]) -> Option<Pad> {
     Some(Pad { name: stem.to_owned(), sensor: format!("builtin:{name}"), shape, rate_hz, link, summary })
 }
 
-/// Aligns the columns.
-fn table(pads: &[Pad]) -> String {
+fn rows(pads: &[Pad]) -> Vec<[String; 5]> {
     let row = |pad: &Pad| {
         let shape: Vec<String> = pad.shape.iter().map(i64::to_string).collect();
         [pad.name.clone(), shape.join("x"), format!("{} Hz", pad.rate_hz), pad.link.clone(), pad.summary.clone()]
     };
-    let rows: Vec<[String; 5]> = pads.iter().map(row).collect();
-    let widths: [usize; 5] = std::array::from_fn(|i| rows.iter().map(|row| row[i].chars().count()).max().unwrap_or(0));
-    let line = |row: &[String; 5]| {
-        let cells: Vec<String> = row.iter().zip(widths).map(|(cell, width)| format!("{cell:width$}")).collect();
-        cells.join("  ").trim_end().to_owned()
-    };
-    rows.iter().map(line).collect::<Vec<_>>().join("\n")
+    pads.iter().map(row).collect()
 }
 
 #[cfg(test)]

@@ -9,7 +9,8 @@ use tactflow_runtime::cli::clap::{self, Parser};
 use tactflow_runtime::graph::{BenchDevice, OpenBench, open_bench};
 use tactflow_runtime::signal::{Image, Joint, Joints, Twist};
 
-use super::guided::{BoundRole, bound_role, chain, mount};
+use super::guided::vectors::three;
+use super::guided::{BoundRole, bound_role, chain, choose, mount};
 use crate::arm::chain::Chain;
 use crate::motion::pose::{rotation_vector, rpy_of};
 
@@ -53,17 +54,11 @@ fn list(text: &str) -> Result<Posture, String> {
     Ok(Posture(numbers.collect::<Result<_, _>>()?))
 }
 
-pub(super) fn run(args: PoseArgs, shell: &Shell) -> u8 {
-    match open_bench(shell.catalogue(), &args.bench) {
-        Err(report) => shell.reject(&report),
-        Ok(bench) => match describe(&args, shell, &bench) {
-            Ok(text) => {
-                shell.say(&text);
-                0
-            }
-            Err(message) => shell.refuse(message),
-        },
-    }
+pub(super) fn run(args: PoseArgs, shell: &Shell) -> Result<u8, u8> {
+    let bench = open_bench(shell.catalogue(), &args.bench).map_err(|report| shell.reject(&report))?;
+    let text = describe(&args, shell, &bench).map_err(|message| shell.refuse(message))?;
+    shell.say(&text);
+    Ok(0)
 }
 
 fn describe(args: &PoseArgs, shell: &Shell, bench: &OpenBench) -> Result<String, String> {
@@ -72,7 +67,7 @@ fn describe(args: &PoseArgs, shell: &Shell, bench: &OpenBench) -> Result<String,
     let chain = chain(shell.catalogue(), description, &bound)?;
     let joints = chain.joints();
     let home = description.fact_on(bound.side.as_deref(), "velocity_arm", "home");
-    let home = home.and_then(|home| home.as_array()).map(|home| home.iter().filter_map(number).collect::<Vec<_>>());
+    let home: Option<Vec<f64>> = home.and_then(|home| home.clone().try_into().ok());
     let (posture, origin) = match &args.at {
         Some(Posture(at)) => (in_radians(at, args.degrees, joints)?, "the given posture"),
         None => (home.ok_or("the arm has no `home`: name a posture with `--at`")?, "`home`"),
@@ -97,31 +92,17 @@ fn describe(args: &PoseArgs, shell: &Shell, bench: &OpenBench) -> Result<String,
 
 /// Returns the arm of the role that is asked for, or the only one.
 fn arm<'b>(args: &PoseArgs, bench: &'b OpenBench) -> Result<(BoundRole, &'b BenchDevice), String> {
-    let arms: Vec<_> = bench
-        .bind
-        .iter()
-        .map(|(role, word)| bound_role(role.clone(), word))
-        .filter_map(|bound| {
-            let device = bench.devices.iter().find(|device| device.name == bound.device)?;
-            device.opened.description.output_on::<Joints>(bound.side.as_deref(), "position")?;
-            Some((bound, device))
-        })
-        .collect();
-    let names = arms.iter().map(|(bound, _)| format!("`{}`", bound.role)).collect::<Vec<_>>().join(", ");
-    // A device that fills several roles is the same arm in each.
-    let is_one = arms.windows(2).all(|two| {
-        let [(a, _), (b, _)] = two else { return true };
-        (&a.device, &a.side) == (&b.device, &b.side)
-    });
-    match &args.arm {
-        _ if arms.is_empty() => Err("the bench binds no arm".into()),
-        None if !is_one => Err(format!("the bench binds several arms: name one of {names} with `--arm`")),
-        wanted => {
-            let mut arms = arms.into_iter();
-            let found = arms.find(|(bound, _)| wanted.as_ref().is_none_or(|wanted| bound.role == *wanted));
-            found.ok_or_else(|| format!("the bench binds no such arm: name one of {names} with `--arm`"))
-        }
+    let arm = |(role, word): &(String, String)| {
+        let bound = bound_role(role.clone(), word);
+        let device = bench.devices.iter().find(|device| device.name == bound.device)?;
+        device.opened.description.output_on::<Joints>(bound.side.as_deref(), "position")?;
+        Some((bound, device))
+    };
+    let arms: Vec<_> = bench.bind.iter().filter_map(arm).collect();
+    if arms.is_empty() {
+        return Err("the bench binds no arm".into());
     }
+    choose(arms, "an arm", args.arm.as_deref(), "--arm")
 }
 
 /// Returns the mounts of all pads, each with its role; all of them, because only a task says on which arm a pad is.
@@ -134,10 +115,6 @@ fn mounts(bench: &OpenBench, arm: &BoundRole) -> Vec<(String, IsometryMatrix3<f6
         Some((role.clone(), mount::stated(&device.opened.description, bound.side.as_deref())?.pose()))
     };
     bench.bind.iter().filter_map(mount).collect()
-}
-
-fn number(value: &toml::Value) -> Option<f64> {
-    value.as_float().or_else(|| value.as_integer().map(|integer| integer as f64))
 }
 
 /// Returns the positions in rad, one for each joint.
@@ -166,14 +143,6 @@ fn line(what: &str, pose: &IsometryMatrix3<f64>) -> String {
         axis(Vector3::x()),
         axis(Vector3::z())
     )
-}
-
-/// Writes three numbers with some decimals.
-fn three(numbers: &Vector3<f64>, decimals: usize) -> String {
-    // Adding zero turns -0 into 0.
-    let scale = 10_f64.powi(decimals as i32);
-    let [x, y, z] = [0, 1, 2].map(|i| (numbers[i] * scale).round() / scale + 0.0);
-    format!("[{x:.decimals$}, {y:.decimals$}, {z:.decimals$}]")
 }
 
 #[cfg(test)]

@@ -30,7 +30,7 @@ pub(super) struct PressArgs {
     #[arg(short, long, value_name = "FILE")]
     out: PathBuf,
     /// Serial number of the pad: `electronics.serial` of a `sim_bench`
-    #[arg(long, default_value_t = Electronics::DEFAULT.serial)]
+    #[arg(long, default_value_t = Electronics::default().serial)]
     serial: u64,
     /// Rows and columns of the pad
     #[arg(long, value_name = "ROWSxCOLS", value_parser = pair::<NonZeroUsize>, default_value = "16x16")]
@@ -47,26 +47,23 @@ const REST_S: f64 = 5.0;
 /// Time of the press, up and down [s].
 const PRESS_S: f64 = 30.0;
 
-pub(super) fn run(args: PressArgs, shell: &Shell) -> u8 {
+pub(super) fn run(args: PressArgs, shell: &Shell) -> Result<u8, u8> {
     let [rows, cols] = args.size.map(NonZeroUsize::get);
     if rows.saturating_mul(cols) > MAX_TACTELS {
-        return shell.refuse(format_args!("a simulated pad has at most {MAX_TACTELS} tactels, not {rows} by {cols}"));
+        let most = format_args!("a simulated pad has at most {MAX_TACTELS} tactels, not {rows} by {cols}");
+        return Err(shell.refuse(most));
     }
-    let done = may_replace(&args.out, "a log of `press`", |text| text.starts_with("time,force,t0_0"))
-        .and_then(|()| write(&args).map_err(|error| format!("cannot write `{}`: {error}", args.out.display())));
-    match done {
-        Ok(frames) => {
-            shell.say(&format!("wrote {}: {frames} frames at {RATE_HZ} Hz", args.out.display()));
-            0
-        }
-        Err(message) => shell.refuse(message),
-    }
+    let frames = may_replace(&args.out, "a log of `press`", |text| text.starts_with("time,force,t0_0"))
+        .and_then(|()| write(&args).map_err(|error| format!("cannot write `{}`: {error}", args.out.display())))
+        .map_err(|message| shell.refuse(message))?;
+    shell.say(&format!("wrote {}: {frames} frames at {RATE_HZ} Hz", args.out.display()));
+    Ok(0)
 }
 
 fn write(args: &PressArgs) -> std::io::Result<usize> {
     let [rows, cols] = args.size.map(NonZeroUsize::get);
     let tactels = rows * cols;
-    let mut readout = Readout::new(tactels, Electronics { serial: args.serial, ..Electronics::DEFAULT }, args.serial);
+    let mut readout = Readout::new(tactels, Electronics { serial: args.serial, ..Electronics::default() }, args.serial);
     let mut file = BufWriter::new(std::fs::File::create(&args.out)?);
     let names = (0..rows).flat_map(|i| (0..cols).map(move |j| format!(",t{i}_{j}")));
     writeln!(file, "time,force{}", names.collect::<String>())?;

@@ -12,7 +12,7 @@ use std::time::{Duration, Instant};
 
 use tactflow_runtime::cli::{Shell, clap, duration};
 
-use super::arguments::{may_replace, positive};
+use super::arguments::{may_replace, positive, write};
 use crate::devices::link::{Address, Connection};
 use heard::{Guess, Heard};
 
@@ -67,44 +67,33 @@ const ANSWERED: Duration = Duration::from_millis(5);
 /// Number of bytes that are shown.
 const SHOWN_BYTES: usize = 64;
 
-pub(super) fn run(args: SniffArgs, shell: &Shell) -> u8 {
-    let address = match Address::parse(&args.link) {
-        Ok(address) => address,
-        Err(message) => return shell.refuse(message),
-    };
-    let words = match Words::read(&args) {
-        Ok(words) => words,
-        Err((message, help)) => return shell.refuse(format_args!("{message}\nhelp: {help}")),
-    };
+pub(super) fn run(args: SniffArgs, shell: &Shell) -> Result<u8, u8> {
+    let address = Address::parse(&args.link).map_err(|message| shell.refuse(message))?;
+    let words = Words::read(&args).map_err(|(message, help)| shell.refuse(format_args!("{message}\nhelp: {help}")))?;
     let bauds = match (&address, args.baud) {
         (Address::Serial(_), None) => &BAUDS[..],
         (_, baud) => &[baud.unwrap_or(0)],
     };
     let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build();
-    let runtime = match runtime {
-        Ok(runtime) => runtime,
-        Err(error) => return shell.refuse(error),
-    };
+    let runtime = runtime.map_err(|error| shell.refuse(error))?;
     for baud in bauds {
         let time = Duration::from_secs_f64(args.time.clamp(0.1, 3600.0));
-        let heard = match runtime.block_on(listen(&address, *baud, &words, time)) {
-            Ok(heard) => heard,
-            Err(message) => return shell.refuse(format_args!("{address}: {message}")),
-        };
+        let heard = runtime.block_on(listen(&address, *baud, &words, time));
+        let heard = heard.map_err(|message| shell.refuse(format_args!("{address}: {message}")))?;
         let at = if *baud > 0 { format!(" at {baud} baud") } else { String::new() };
         shell.say(&format!("{} bytes in {:.1} s{at}{}", heard.bytes.len(), heard.seconds, dump(&heard.bytes)));
         let guess = text::guess(&heard).or_else(|| replies::guess(&heard)).or_else(|| binary::guess(&heard));
         if let Some(guess) = guess {
             let description = description(&guess, *baud, &args);
             guess.findings.iter().for_each(|finding| shell.say(&format!("- {finding}")));
-            return write(&args, &description, shell);
+            return save(&args, &description, shell);
         }
     }
     shell.error(
         "no frames were found\nhelp: press on the pad while it is heard, try `--baud`, `--send` or `--poll`, and listen longer \
          with `--for`",
     );
-    1
+    Ok(1)
 }
 
 /// What is sent to a pad.
@@ -200,19 +189,13 @@ fn description(guess: &Guess, baud: u32, args: &SniffArgs) -> String {
     text
 }
 
-fn write(args: &SniffArgs, description: &str, shell: &Shell) -> u8 {
+fn save(args: &SniffArgs, description: &str, shell: &Shell) -> Result<u8, u8> {
     let Some(out) = &args.out else {
         shell.say(&format!("\n{description}"));
-        return 0;
+        return Ok(0);
     };
-    let written = may_replace(out, "a description of a pad", |text| text.contains("[sensor]")).and_then(|()| {
-        std::fs::write(out, description).map_err(|error| format!("cannot write `{}`: {error}", out.display()))
-    });
-    match written {
-        Ok(()) => {
-            shell.say(&format!("wrote {}", out.display()));
-            0
-        }
-        Err(message) => shell.refuse(message),
-    }
+    let may_write = may_replace(out, "a description of a pad", |text| text.contains("[sensor]"));
+    may_write.and_then(|()| write(out, description)).map_err(|message| shell.refuse(message))?;
+    shell.say(&format!("wrote {}", out.display()));
+    Ok(0)
 }

@@ -60,6 +60,11 @@ impl Words {
         Self { words, known, are_complete }
     }
 
+    /// Whether no word is left.
+    pub(crate) fn are_all_taken(&self) -> bool {
+        self.words.is_empty()
+    }
+
     /// Takes a word out.
     fn take(&mut self, name: &str) -> Option<Word> {
         debug_assert!(self.known.contains(&name), "`{name}` is asked for but not known");

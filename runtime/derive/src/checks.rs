@@ -2,7 +2,7 @@
 
 use proc_macro2::{Span, TokenStream};
 use quote::{ToTokens, quote};
-use syn::{Attribute, DeriveInput, Ident, LitStr};
+use syn::{DeriveInput, Ident, LitStr};
 
 use crate::attributes::Words;
 use crate::fault::{Faults, asserted, assertion};
@@ -88,9 +88,9 @@ pub(crate) fn letters(input: &DeriveInput, ports: &[Port]) -> TokenStream {
     }
 }
 
-/// The struct of the inputs whose letters count: `Inputs`, or what `inputs = "…"` names.
-pub(crate) fn inputs_beside(attributes: &[Attribute], attribute: &str, faults: &mut Faults) -> Ident {
-    let named = Words::new(attributes, attribute, &["inputs"], faults).text("inputs", faults);
+/// The struct of the inputs whose letters count: `Inputs`, or what `inputs = "…"` names among the words of a struct.
+pub(crate) fn inputs_beside(mut words: Words, faults: &mut Faults) -> Ident {
+    let named = words.text("inputs", faults);
     named.and_then(|name| faults.take(name.parse())).unwrap_or_else(|| Ident::new("Inputs", Span::call_site()))
 }
 

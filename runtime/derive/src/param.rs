@@ -12,7 +12,8 @@ use crate::checks::{LetterKind, bound_letter, inputs_beside, is_unit_letter};
 use crate::docs::text;
 use crate::fault::{Faults, asserted};
 
-const KNOWN: &[&str] = &["unit", "range", "above", "usual", "default", "live", "from_bench"];
+const KNOWN: &[&str] = &["unit", "range", "above", "usual", "default", "live", "from_bench", "flatten"];
+const KNOWN_OF_TABLE: &[&str] = &["inputs", "default"];
 
 /// One field of a table of parameters.
 struct Parameter {
@@ -27,6 +28,8 @@ struct Parameter {
     default: Option<Expr>,
     is_live: bool,
     is_from_bench: bool,
+    /// Whether it is a table whose fields are fields of the table around it.
+    is_flat: bool,
 }
 
 pub(crate) fn derive(input: &DeriveInput) -> TokenStream {
@@ -43,46 +46,108 @@ fn table(input: &DeriveInput, faults: &mut Faults) -> TokenStream {
     let parameters: Vec<Parameter> = fields.into_iter().filter_map(|field| parameter(field, faults)).collect();
     let (ident, (generics, arguments, bounds)) = (&input.ident, input.generics.split_for_impl());
     let idents: Vec<&Ident> = parameters.iter().map(|parameter| &parameter.name).collect();
-    let names: Vec<String> = idents.iter().map(|ident| ident.to_string()).collect();
-    let specs = parameters.iter().map(|parameter| {
-        let (ty, declared, default) = (&parameter.field.ty, declared(parameter), default(parameter));
-        quote_spanned!(ty.span()=> ::tactflow_runtime::node::ParamSpec::of::<#ty>(&#declared, #default))
-    });
-    let reads = parameters.iter().map(|parameter| {
-        let (ty, name) = (&parameter.field.ty, &parameter.name);
-        let (declared, default) = (declared(parameter), default(parameter));
-        quote_spanned!(ty.span()=> let #name = reader.field::<#ty>(&mut table, &#declared, #default);)
-    });
-    let written = parameters.iter().map(|parameter| {
+    let (flat, own): (Vec<&Parameter>, Vec<&Parameter>) = parameters.iter().partition(|parameter| parameter.is_flat);
+    let names: Vec<String> = own.iter().map(|parameter| parameter.name.to_string()).collect();
+    let (flat_idents, flat_types): (Vec<_>, Vec<_>) =
+        flat.iter().map(|parameter| (&parameter.name, &parameter.field.ty)).unzip();
+    let specs = parameters.iter().map(spec);
+    let reads = parameters.iter().map(read);
+    let written = own.iter().map(|parameter| {
         let (ty, ident, name) = (&parameter.field.ty, &parameter.name, parameter.name.to_string());
         quote_spanned!(ty.span()=> (#name, <#ty as ::tactflow_runtime::node::Param>::written(&self.#ident)))
     });
-    let inputs = inputs_beside(&input.attrs, "param", faults);
+    let mut words = Words::new(&input.attrs, "param", KNOWN_OF_TABLE, faults);
+    let defaults = words.flag("default", faults).map(|_| defaults(ident, &parameters, faults));
+    let inputs = inputs_beside(words, faults);
     let checks: TokenStream = parameters.iter().map(|parameter| checks(parameter, input, &inputs)).collect();
     quote! {
         #checks
+        #defaults
 
         #[automatically_derived]
         impl #generics ::tactflow_runtime::node::Param for #ident #arguments #bounds {
             const EXPECTS: &'static str = "a table";
 
             const CONTENTS: ::tactflow_runtime::node::Contents = ::tactflow_runtime::node::Contents {
-                fields: || ::std::vec![#(#specs),*],
+                fields: || {
+                    let specs: &[::std::vec::Vec<::tactflow_runtime::node::ParamSpec>] = &[#(#specs),*];
+                    specs.concat()
+                },
                 ..::tactflow_runtime::node::Contents::OPAQUE
             };
 
             fn written(&self) -> ::core::option::Option<::tactflow_runtime::node::Written> {
-                ::tactflow_runtime::node::written_table([#(#written),*])
+                ::tactflow_runtime::node::written_table(
+                    [#(#written),*],
+                    [#(<#flat_types as ::tactflow_runtime::node::Param>::written(&self.#flat_idents)),*],
+                )
             }
 
             fn read(
                 value: &::tactflow_runtime::source::Value,
                 reader: &mut ::tactflow_runtime::node::Reader<'_>,
             ) -> ::core::option::Option<Self> {
-                let mut table = reader.table(value, &[#(#names),*])?;
+                reader.fields(value)
+            }
+        }
+
+        #[automatically_derived]
+        impl #generics ::tactflow_runtime::node::ParamTable for #ident #arguments #bounds {
+            fn names() -> ::std::vec::Vec<&'static str> {
+                let flat: &[::std::vec::Vec<&'static str>] =
+                    &[#(<#flat_types as ::tactflow_runtime::node::ParamTable>::names()),*];
+                [::std::vec![#(#names),*], flat.concat()].concat()
+            }
+
+            fn read_fields(
+                table: &mut ::tactflow_runtime::node::OpenTable,
+                reader: &mut ::tactflow_runtime::node::Reader<'_>,
+            ) -> ::core::option::Option<Self> {
                 #(#reads)*
-                reader.close(table);
                 ::core::option::Option::Some(Self { #(#idents: #idents?),* })
+            }
+        }
+    }
+}
+
+/// The descriptions of a field: its own, or those of the fields of a flat table.
+fn spec(parameter: &Parameter) -> TokenStream {
+    let (ty, declared, default) = (&parameter.field.ty, declared(parameter), default(parameter));
+    match parameter.is_flat {
+        true => quote_spanned!(ty.span()=> <#ty as ::tactflow_runtime::node::Param>::fields()),
+        false => quote_spanned! {
+            ty.span()=> ::std::vec![::tactflow_runtime::node::ParamSpec::of::<#ty>(&#declared, #default)]
+        },
+    }
+}
+
+fn read(parameter: &Parameter) -> TokenStream {
+    let (ty, name, declared, default) = (&parameter.field.ty, &parameter.name, declared(parameter), default(parameter));
+    match parameter.is_flat {
+        true => quote_spanned! {
+            ty.span()=> let #name = <#ty as ::tactflow_runtime::node::ParamTable>::read_fields(table, reader);
+        },
+        false => quote_spanned!(ty.span()=> let #name = reader.field::<#ty>(table, &#declared, #default);),
+    }
+}
+
+/// Implements `Default` from the defaults of the fields.
+fn defaults(ident: &Ident, parameters: &[Parameter], faults: &mut Faults) -> TokenStream {
+    let values = parameters.iter().map(|parameter| {
+        let Parameter { field, name, is_flat, .. } = parameter;
+        let value = default_value(parameter);
+        if value.is_none() && !is_flat && !is_called(&field.ty, "Option") {
+            faults.add(name, format!("`{name}` needs a `default`, because the table has one"));
+        }
+        let value = value.unwrap_or_else(|| quote_spanned!(name.span()=> ::core::default::Default::default()));
+        quote!(#name: #value)
+    });
+    let values: Vec<TokenStream> = values.collect();
+    quote! {
+        #[automatically_derived]
+        impl ::core::default::Default for #ident {
+            fn default() -> Self {
+                Self { #(#values),* }
             }
         }
     }
@@ -90,10 +155,15 @@ fn table(input: &DeriveInput, faults: &mut Faults) -> TokenStream {
 
 fn parameter(field: Field, faults: &mut Faults) -> Option<Parameter> {
     let name = field.ident.clone()?;
-    if text(&field.attrs).is_empty() {
+    let mut words = Words::new(&field.attrs, "param", KNOWN, faults);
+    let flat = words.flag("flatten", faults);
+    let is_flat = flat.is_some();
+    if let Some(flat) = flat.filter(|_| !words.are_all_taken()) {
+        faults.add(flat, "`flatten` stands alone: the fields of the table have attributes of their own");
+    }
+    if text(&field.attrs).is_empty() && !is_flat {
         faults.add(&name, format!("`{name}` needs a doc comment: what it means"));
     }
-    let mut words = Words::new(&field.attrs, "param", KNOWN, faults);
     let (unit, is_live) = (words.text("unit", faults), words.flag("live", faults).is_some());
     let is_from_bench = words.flag("from_bench", faults).is_some();
     let (range, above) = (words.value("range", faults), words.value("above", faults));
@@ -109,7 +179,7 @@ fn parameter(field: Field, faults: &mut Faults) -> Option<Parameter> {
         (None, None) => None,
     };
     let bounds_at = range.or(above).map(|(_, value)| value);
-    Some(Parameter { field, name, unit, bounds, bounds_at, usual, default, is_live, is_from_bench })
+    Some(Parameter { field, name, unit, bounds, bounds_at, usual, default, is_live, is_from_bench, is_flat })
 }
 
 /// The bounds that a range such as `0.0..=1.0` or `0.0..` says.
@@ -150,13 +220,21 @@ fn option(value: Option<TokenStream>) -> TokenStream {
 /// The default as a function, if there is one.
 fn default(parameter: &Parameter) -> TokenStream {
     let ty = &parameter.field.ty;
-    option(parameter.default.as_ref().map(|default| {
-        let is_string =
-            matches!(ty, Type::Path(path) if path.path.segments.last().is_some_and(|last| last.ident == "String"));
-        let is_text = is_string && matches!(default, Expr::Lit(ExprLit { lit: Lit::Str(_), .. }));
-        let value = if is_text { quote!(::core::convert::Into::into(#default)) } else { quote!(#default) };
-        quote_spanned!(default.span()=> (|| -> #ty { #value }) as fn() -> #ty)
-    }))
+    let place = parameter.default.as_ref().map_or_else(|| ty.span(), Spanned::span);
+    option(default_value(parameter).map(|value| quote_spanned!(place=> (|| -> #ty { #value }) as fn() -> #ty)))
+}
+
+fn default_value(parameter: &Parameter) -> Option<TokenStream> {
+    let default = parameter.default.as_ref()?;
+    let is_text = matches!(default, Expr::Lit(ExprLit { lit: Lit::Str(_), .. }));
+    Some(match is_text && is_called(&parameter.field.ty, "String") {
+        true => quote!(::core::convert::Into::into(#default)),
+        false => quote!(#default),
+    })
+}
+
+fn is_called(ty: &Type, name: &str) -> bool {
+    matches!(ty, Type::Path(path) if path.path.segments.last().is_some_and(|last| last.ident == name))
 }
 
 /// Checks what needs the type, the list of units or the inputs.

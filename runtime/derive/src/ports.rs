@@ -5,7 +5,7 @@ use quote::{quote, quote_spanned};
 use syn::spanned::Spanned;
 use syn::{DeriveInput, GenericParam, Generics, Ident, Lifetime, Type};
 
-use crate::attributes::beside;
+use crate::attributes::{Words, beside};
 use crate::checks::{bound, checks, generic_checks, inputs_beside, letters};
 use crate::docs::text;
 use crate::fault::Faults;
@@ -73,7 +73,8 @@ pub(crate) fn inputs(input: &DeriveInput) -> TokenStream {
 
 pub(crate) fn outputs(input: &DeriveInput) -> TokenStream {
     let mut faults = Faults::default();
-    let (ports, inputs) = (ports(input, false, &mut faults), inputs_beside(&input.attrs, "port", &mut faults));
+    let words = Words::new(&input.attrs, "port", &["inputs"], &mut faults);
+    let (ports, inputs) = (ports(input, false, &mut faults), inputs_beside(words, &mut faults));
     let (name, shapes, shapes_name) = (&input.ident, shapes(input, &ports), beside(&input.ident, "Shapes"));
     let (head, arguments, bounds) = input.generics.split_for_impl();
     let (names, specs) = (names(&ports), ports.iter().map(spec));

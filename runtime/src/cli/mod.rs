@@ -40,12 +40,11 @@ use shell::{Colour, standard_error};
 
 /// The parser of arguments, for the commands of other crates.
 pub use clap;
-pub use explain::explanation;
 pub use reference::pages::reference;
 pub use run::{Commissioning, Job, JobOptions, Print, Proof, duration};
-pub use shell::command::{OutputFormat, Subcommand, derived};
+pub use shell::command::{CommandEnd, OutputFormat, Subcommand, derived};
 pub use shell::{FAULTED, INTERRUPTED, NOT_LOADED, Shell};
-pub use text::svg;
+pub use text::{svg, table::table};
 
 /// Tactile servoing from graph files.
 #[derive(Parser)]
@@ -65,6 +64,7 @@ struct Cli {
 }
 
 /// The tool: a catalogue and its commands.
+#[must_use]
 pub struct Tool {
     catalogue: Catalogue,
     commands: Vec<Subcommand>,
@@ -72,7 +72,6 @@ pub struct Tool {
 
 impl Tool {
     /// Creates the tool with the commands that work for every catalogue.
-    #[must_use]
     pub fn new(catalogue: Catalogue) -> Self {
         Self {
             catalogue,
@@ -92,7 +91,6 @@ impl Tool {
     ///
     /// # Panics
     /// If a command has that name already.
-    #[must_use]
     pub fn command(mut self, command: Subcommand) -> Self {
         let is_taken = self.commands.iter().any(|other| other.name() == command.name());
         assert!(!is_taken, "two commands are called `{}`", command.name());

@@ -4,7 +4,7 @@ use std::io;
 use std::time::{Duration, Instant};
 
 use super::exchange::SampleState;
-use super::live::{LinkSetup, Linked, Live, start};
+use super::live::{LinkSetup, Linked, Live, start, wait};
 use super::{ClockReading, Commands, Description, DeviceError, Output, Samples};
 use crate::signal::Signal;
 
@@ -191,10 +191,7 @@ impl Attached {
     pub fn stop(mut self, reason: &str) -> Result<(), DeviceError> {
         const GRACE: Duration = Duration::from_secs(1);
         self.linked.stop(reason);
-        let end = Instant::now() + GRACE;
-        while !self.linked.has_ended() && Instant::now() < end {
-            std::thread::sleep(Duration::from_millis(1));
-        }
+        wait(GRACE, || self.linked.has_ended());
         match self.linked.ended() {
             Some(Ok(ended)) => ended,
             Some(Err(_)) => Err("it panicked".into()),

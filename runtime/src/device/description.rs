@@ -28,7 +28,7 @@ type Name = Cow<'static, str>;
 /// pad.fact_in("threshold", 0.015, Unit::NEWTON);
 /// # let _ = image;
 /// ```
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Default)]
 pub struct Description {
     /// Nominal time between two samples [s].
     pub period: f64,
@@ -68,17 +68,8 @@ pub(crate) struct StatedPort {
 impl Description {
     /// A device that samples every `period` [s] and fills no role yet.
     #[must_use]
-    pub const fn every(period: f64) -> Self {
-        Self {
-            period,
-            latency: 0.0,
-            on_silence: None,
-            needs_commissioning: false,
-            fills: Vec::new(),
-            outputs: Vec::new(),
-            commands: Vec::new(),
-            reports: Vec::new(),
-        }
+    pub fn every(period: f64) -> Self {
+        Self { period, ..Self::default() }
     }
 
     /// Declares what a device that moves does without commands: it is at rest `within` this time [s].

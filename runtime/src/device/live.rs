@@ -382,3 +382,11 @@ impl Linked {
         self.driver.take_if(|driver| driver.is_finished()).map(JoinHandle::join)
     }
 }
+
+/// Waits until something is so, for a time at most.
+pub(crate) fn wait(patience: Duration, is_so: impl Fn() -> bool) {
+    let end = Instant::now() + patience;
+    while !is_so() && Instant::now() < end {
+        std::thread::sleep(Duration::from_millis(1));
+    }
+}

@@ -29,11 +29,12 @@ pub use description::{Command, Description, Fill, Output, Report};
 pub use exchange::{Commands, Samples};
 pub(crate) use exchange::{PortSample, SampleState};
 pub use live::{Link, Live};
-pub(crate) use live::{LinkSetup, Linked, start};
+pub(crate) use live::{LinkSetup, Linked, start, wait};
 pub use silence::{OnSilence, Silence};
 
 /// The type of a role: the ports that a task reads, and the ports that it commands.
 #[derive(Debug, Clone, Default)]
+#[must_use]
 pub struct RoleType {
     /// Its name in the section `[roles]`.
     pub name: Cow<'static, str>,

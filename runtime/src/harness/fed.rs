@@ -12,6 +12,7 @@ use crate::source::Value;
 
 /// A role that a test feeds.
 #[derive(Debug, Clone)]
+#[must_use]
 pub struct FedRole {
     pub(super) name: String,
     kind: String,
@@ -25,28 +26,24 @@ impl FedRole {
     /// Creates the role `name` of the type `kind`, with a nominal period of `period_ms`.
     ///
     /// Scalars, flags, twists and poses have no size, so only the other ports of the role need a shape.
-    #[must_use]
     pub fn new(name: impl Into<String>, kind: impl Into<String>, period_ms: f64) -> Self {
         let (outputs, commands, facts) = (Vec::new(), Vec::new(), Vec::new());
         Self { name: name.into(), kind: kind.into(), period: period_ms * 1e-3, outputs, commands, facts }
     }
 
     /// Sets the shape of an output.
-    #[must_use]
     pub fn output(mut self, name: impl Into<String>, shape: impl Into<Shape>) -> Self {
         self.outputs.push((name.into(), shape.into()));
         self
     }
 
     /// Sets the joints of a command.
-    #[must_use]
     pub fn command(mut self, name: impl Into<String>, shape: JointsShape) -> Self {
         self.commands.push((name.into(), shape));
         self
     }
 
     /// States a fact that the graph uses, as in `{ from = "pad.threshold" }`.
-    #[must_use]
     pub fn fact(mut self, name: impl Into<String>, value: impl Into<toml::Value>) -> Self {
         self.facts.push((name.into(), value.into()));
         self

@@ -173,7 +173,6 @@ impl GraphRig {
     ///
     /// # Panics
     /// If there is no such port.
-    #[must_use]
     pub fn freshness(&self, port: &str) -> Freshness {
         self.engine.mark(port).freshness(self.engine.ticks())
     }

@@ -175,7 +175,6 @@ impl NodeRig {
     ///
     /// # Panics
     /// If there is no such output.
-    #[must_use]
     pub fn freshness(&self, output: &str) -> Freshness {
         self.mark(output).freshness(self.tick.index - 1)
     }

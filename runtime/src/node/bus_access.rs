@@ -59,7 +59,6 @@ impl Bus {
 
     /// Returns the freshness of one scalar in `tick`. Each feature has its own; other scalars have that of their port.
     #[inline]
-    #[must_use]
     pub fn scalar_freshness(&self, ScalarId { port, kind, index }: ScalarId, tick: u64) -> Freshness {
         match kind {
             Kind::Features => self.slot::<Features>(port).components()[index].freshness(tick),

@@ -42,8 +42,11 @@ fn fault<T: Param>(written: &Written, bounds: Option<Bounds>) -> Option<String> 
 
 #[cfg(test)]
 mod tests {
-    use crate::node::{Map, Param, Repeats, Spanned};
+    use std::path::Path;
+
+    use crate::node::{At, Map, Mistake, Param, ParamTable, Reader, Repeats, Spanned};
     use crate::signal::Unit;
+    use crate::source::{SourceMap, parse_table};
 
     /// A choice between words.
     #[derive(Debug, Clone, Param)]
@@ -114,6 +117,66 @@ mod tests {
         assert_eq!(repeats("mount"), Some(Repeats::Once));
         assert_eq!(repeats("press"), Some(Repeats::PerEntry));
         assert_eq!(repeats("gains"), Some(Repeats::PerName));
+    }
+
+    /// Parameters that several tables share.
+    #[derive(Debug, Clone, PartialEq, Param)]
+    #[param(default)]
+    struct Shared {
+        /// How strong.
+        #[param(unit = "N", above = 0.0, default = 2.0)]
+        force: f64,
+        /// Whose.
+        of: Option<String>,
+    }
+
+    /// A table with those of another one.
+    #[derive(Debug, Clone, PartialEq, Param)]
+    struct Around {
+        /// The first one.
+        first: u64,
+        #[param(flatten)]
+        shared: Shared,
+        /// The last one.
+        #[param(default = 3)]
+        last: u64,
+    }
+
+    fn read(text: &str) -> (Option<Around>, Vec<(String, String)>) {
+        let mut sources = SourceMap::default();
+        let table = parse_table(sources.add_file(Path::new("a.toml"), text)).unwrap();
+        let mut reader = Reader::new(&sources);
+        let read = Around::read(&table, &mut reader);
+        let mistake = |mistake: &Mistake| match &mistake.at {
+            At::Span(span) => (text[span.clone()].to_owned(), mistake.message.clone()),
+            other => panic!("{other:?}"),
+        };
+        (read, reader.mistakes.iter().map(mistake).collect())
+    }
+
+    #[test]
+    fn a_flat_table_is_read_described_and_written_as_if_its_fields_were_those_of_the_other() {
+        let names: Vec<&str> = Around::fields().iter().map(|spec| spec.name).collect();
+        assert_eq!(
+            (names.as_slice(), &*Around::names()),
+            (&["first", "force", "of", "last"][..], &["first", "last", "force", "of"][..])
+        );
+        let shared = Shared { force: 2.0, of: None };
+        assert_eq!(Shared::default(), shared);
+        let around = Around { first: 1, shared, last: 3 };
+        assert_eq!(read("first = 1"), (Some(around.clone()), vec![]));
+        assert_eq!(around.written().unwrap().to_string(), "{ first = 1, force = 2.0, last = 3 }");
+        let (all, _) = read("first = 1\nforce = 4\nof = \"me\"\nlast = 5");
+        let shared = Shared { force: 4.0, of: Some("me".into()) };
+        assert_eq!(all, Some(Around { first: 1, shared, last: 5 }));
+    }
+
+    #[test]
+    fn each_mistake_in_a_flat_table_has_its_place() {
+        let (none, mistakes) = read("frist = 1\nforce = -1\nlast = \"x\"");
+        assert_eq!(none, None);
+        let places: Vec<&str> = mistakes.iter().map(|(place, _)| place.as_str()).collect();
+        assert_eq!(places, ["frist", "-1", "\"x\""], "{mistakes:?}");
     }
 
     #[test]

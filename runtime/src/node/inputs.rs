@@ -32,7 +32,6 @@ impl<'a, T> In<'a, T> {
     }
 
     /// Returns the stamp of the sample that the value was computed from.
-    #[must_use]
     pub const fn stamp(&self) -> Stamp {
         self.mark.stamp()
     }
@@ -67,7 +66,6 @@ impl<'a> In<'a, Features> {
     }
 
     /// Returns the freshness of component `i`.
-    #[must_use]
     pub fn freshness(&self, i: usize) -> Freshness {
         self.value.components()[i].freshness(self.tick)
     }
@@ -109,7 +107,6 @@ impl<'a, T> Many<'a, T> {
     }
 
     /// Returns the freshness of wire `i`.
-    #[must_use]
     pub fn freshness(&self, i: usize) -> Freshness {
         self.marks[self.ports[i].mark as usize].freshness(self.tick)
     }

@@ -33,6 +33,7 @@ pub enum At {
 
 /// One mistake: its place, what is wrong, and how to fix it.
 #[derive(Debug, Clone, PartialEq, Eq)]
+#[must_use]
 pub struct Mistake {
     /// The code.
     pub code: Code,
@@ -77,7 +78,6 @@ impl Mistake {
     }
 
     /// A file is not readable.
-    #[must_use]
     pub fn unreadable(file: &FilePath, error: &io::Error) -> Self {
         let message = format!("cannot read `{}`: {error}", file.path.display());
         Self::new(Code::Unreadable, At::Span(file.span.clone()), message)
@@ -86,7 +86,6 @@ impl Mistake {
     /// Adds the help for an unknown `name`, which is marked: the closest of the `known` names, or all of them.
     ///
     /// `what` names the known things in the plural, for example "features".
-    #[must_use]
     pub fn suggest<'n>(self, name: &str, known: impl Iterator<Item = &'n str> + Clone, what: &str) -> Self {
         match suggest_name(name, known.clone()) {
             Some(best) => self.instead(name, best),
@@ -95,7 +94,6 @@ impl Mistake {
     }
 
     /// Suggests `best` in place of `name`, which is marked.
-    #[must_use]
     pub fn instead(self, name: &str, best: &str) -> Self {
         Self { instead: Some(Box::new((name.to_owned(), best.to_owned()))), ..self.help(did_you_mean(best)) }
     }
@@ -110,7 +108,6 @@ impl Mistake {
     }
 
     /// Adds a way to fix it.
-    #[must_use]
     pub fn help(mut self, help: impl Into<String>) -> Self {
         self.help = Some(help.into());
         self

@@ -6,7 +6,7 @@
 //! | Derive | implements | reads |
 //! |---|---|---|
 //! | `#[derive(Describe)]` | [`Describe`](trait@Describe) | the name, the doc comment, `#[describe(name = "…", every_tick, logs)]` |
-//! | `#[derive(Param)]` | [`Param`](trait@Param) for a table or a word | `#[param(unit = "…", range = …, above = …, usual = …, default = …, live, from_bench)]` |
+//! | `#[derive(Param)]` | [`Param`](trait@Param) for a table or a word | `#[param(unit = "…", range = …, above = …, usual = …, default = …, live, from_bench)]`, `#[param(flatten)]` |
 //! | `#[derive(Inputs)]` | [`InputSet`] | `#[port(unit = "…", frame = "…", …)]` |
 //! | `#[derive(Outputs)]` | [`OutputSet`] | the same |
 //! | `#[derive(State)]` | [`Default`]; [`Clone`], field by field, so that a reset does not allocate | |
@@ -74,7 +74,7 @@ pub use param_spec::{Contents, Declared, ParamSpec, Repeats, Written, written_ta
 pub use params::{Map, Spanned};
 pub(crate) use pattern::{UnitPattern, declares_a_unit, frame_args, may_fit, unit_pattern};
 pub use ports::{LetterKind, Letters, Need, PortSpec};
-pub use reader::{Measured, Param, Reader, read_leaf};
+pub use reader::{Measured, OpenTable, Param, ParamTable, Reader, read_leaf};
 pub use tactflow_derive::{Describe, Inputs, Outputs, Param, State};
 pub use tick::Tick;
 pub use time::{Absence, Interval};

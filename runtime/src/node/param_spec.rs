@@ -5,12 +5,17 @@ use super::bounds::Bounds;
 /// A parameter in the form of a graph file.
 pub type Written = toml::Value;
 
-/// Returns a table of parameters in the form of a graph file, without the entries that are `None`.
+/// Returns a table of parameters in the form of a graph file, without the entries that are `None`, and with those of
+/// the tables that are flat in it.
 #[doc(hidden)]
 #[must_use]
-pub fn written_table<const N: usize>(fields: [(&str, Option<Written>); N]) -> Option<Written> {
-    let entries = fields.into_iter().filter_map(|(name, value)| Some((name.to_owned(), value?)));
-    Some(Written::Table(entries.collect()))
+pub fn written_table<const N: usize, const M: usize>(
+    fields: [(&str, Option<Written>); N],
+    flat: [Option<Written>; M],
+) -> Option<Written> {
+    let own = fields.into_iter().filter_map(|(name, value)| Some((name.to_owned(), value?)));
+    let flat = flat.into_iter().flatten().filter_map(|table| table.try_into::<toml::Table>().ok());
+    Some(Written::Table(own.chain(flat.flatten()).collect()))
 }
 
 /// The description of a parameter.

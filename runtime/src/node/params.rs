@@ -10,7 +10,7 @@ use super::mistake::{At, Mistake, Mistakes, refuse_any};
 use super::param_spec::{Contents, Repeats, Written};
 use super::reader::{Param, Reader, read_leaf};
 use crate::signal::Unit;
-use crate::source::{Code, suggest_name};
+use crate::source::{Code, quoted, suggest_name};
 use crate::source::{Item, Key, Value};
 
 macro_rules! leaves {
@@ -273,7 +273,7 @@ impl<T> Map<T> {
     /// One mistake for every feature without an entry and for every entry without a feature.
     pub fn in_order<'n>(&self, param: &str, names: impl Iterator<Item = &'n str> + Clone) -> Result<Vec<&T>, Mistakes> {
         let mut mistakes = Mistakes::new();
-        let listed = || names.clone().map(|name| format!("`{name}`")).collect::<Vec<_>>().join(", ");
+        let listed = || quoted(names.clone());
         let strange = self.0.keys().filter(|key| !names.clone().any(|name| name == *key)).count();
         let mut missing = names.clone().filter(|name| !self.0.contains_key(*name));
         // One missing and one unknown name are one mistake.

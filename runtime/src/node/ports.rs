@@ -38,6 +38,7 @@ impl Need {
 
 /// The declaration of a port.
 #[derive(Debug, Clone, PartialEq)]
+#[must_use]
 pub struct PortSpec {
     /// Name in the graph file.
     pub name: Cow<'static, str>,
@@ -58,27 +59,23 @@ pub struct PortSpec {
 impl PortSpec {
     /// Returns the declaration of an output, or of an input that must be wired and present, with the arguments in the
     /// order of its kind.
-    #[must_use]
     pub fn new(name: &'static str, doc: &'static str, kind: Kind, args: &[&'static str]) -> Self {
         let args = args.iter().copied().map(Cow::Borrowed).collect();
         Self { name: name.into(), doc: doc.into(), kind, args, quantity: None, need: Need::REQUIRED }
     }
 
     /// Returns the declaration with a quantity.
-    #[must_use]
     pub fn of_quantity(self, quantity: &'static str) -> Self {
         Self { quantity: Some(quantity.into()), ..self }
     }
 
     /// Returns the declaration of an input that may be unwired, or of an output of a role that a device need not state.
-    #[must_use]
     pub fn optional(self) -> Self {
         Self { need: Need::OPTIONAL, ..self }
     }
 
     /// Returns the declaration of a port of signal `T`, with its arguments by name. It leaves out arguments that the
     /// kind does not have, and frames from the first `"_"` on.
-    #[must_use]
     pub fn of<T: Signal>(
         name: &'static str,
         doc: &'static str,

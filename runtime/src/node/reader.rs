@@ -55,6 +55,21 @@ pub trait Param: Sized {
     }
 }
 
+/// A table of parameters, whose fields can stand among those of another table: `#[param(flatten)]`.
+/// `#[derive(Param)]` implements it for a struct.
+#[diagnostic::on_unimplemented(
+    message = "`{Self}` is not a table of parameters",
+    note = "only a struct with `#[derive(Param)]` can be flattened"
+)]
+pub trait ParamTable: Param {
+    /// Returns the names of its fields.
+    #[must_use]
+    fn names() -> Vec<&'static str>;
+
+    /// Reads its fields out of a table, which may have others. It adds its mistakes to the reader and returns `None`.
+    fn read_fields(table: &mut OpenTable, reader: &mut Reader<'_>) -> Option<Self>;
+}
+
 /// The values that were written with a unit, each as the number that was read, with its place.
 pub type Measured = Vec<(Range<usize>, Item)>;
 
@@ -144,6 +159,14 @@ impl<'a> Reader<'a> {
             }
         }
         Some(OpenTable { rest, span: value.span.clone(), known: known.to_vec(), strange, missing: Vec::new() })
+    }
+
+    /// Reads a table with the fields of `T`, and no others.
+    pub fn fields<T: ParamTable>(&mut self, value: &Value) -> Option<T> {
+        let mut table = self.table(value, &T::names())?;
+        let read = T::read_fields(&mut table, self);
+        self.close(table);
+        read
     }
 
     /// Reads one field of a table; returns `None` after a mistake.

@@ -1,7 +1,9 @@
 //! What the figures of a scenario are, and the bounds on them.
 
+use crate::node::Param;
+
 /// A figure of a check.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Param)]
 pub enum Figure {
     /// Time at which the value has settled [s].
     Response,
@@ -31,19 +33,7 @@ impl Figure {
     /// Returns the name of the figure in tables.
     #[must_use]
     pub const fn name(self) -> &'static str {
-        match self {
-            Self::Response => "response",
-            Self::Error => "error",
-            Self::Mean => "mean",
-            Self::Std => "std",
-            Self::Max => "max",
-            Self::Min => "min",
-            Self::Change => "change",
-            Self::Return => "return",
-            Self::Lost => "lost",
-            Self::Away => "away",
-            Self::Ends => "ends",
-        }
+        Self::CONTENTS.words[self as usize].0
     }
 
     /// Whether the figure is a time.

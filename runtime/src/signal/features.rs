@@ -60,13 +60,11 @@ impl Component {
     }
 
     /// Returns the freshness in `tick`.
-    #[must_use]
     pub const fn freshness(&self, tick: u64) -> Freshness {
         self.mark.freshness(tick)
     }
 
     /// Returns the stamp of the value.
-    #[must_use]
     pub const fn stamp(&self) -> Stamp {
         self.mark.stamp()
     }

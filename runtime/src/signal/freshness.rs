@@ -2,6 +2,7 @@
 
 /// Freshness of a value in a tick.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[must_use]
 pub enum Freshness {
     /// There is no value, and there was none in the previous tick.
     Absent,
@@ -15,6 +16,7 @@ pub enum Freshness {
 
 /// The time and the device of the sample that a value was computed from.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[must_use]
 pub struct Stamp {
     /// Time of the sample in the graph's clock [ns].
     pub nanos: i64,
@@ -33,7 +35,6 @@ impl Stamp {
     }
 
     /// Returns the older of two stamps.
-    #[must_use]
     pub const fn oldest(self, other: Self) -> Self {
         if other.nanos < self.nanos { other } else { self }
     }
@@ -75,7 +76,6 @@ impl Mark {
     }
 
     /// Returns the freshness in `tick`.
-    #[must_use]
     pub const fn freshness(&self, tick: u64) -> Freshness {
         match (self.present, self.changed == tick) {
             (true, true) => Freshness::New,
@@ -98,7 +98,6 @@ impl Mark {
     }
 
     /// Returns the stamp of the value, or the last one if the value is absent.
-    #[must_use]
     pub const fn stamp(&self) -> Stamp {
         Stamp { nanos: self.nanos, device: self.device }
     }

@@ -22,6 +22,12 @@ impl ImageShape {
         self.rows * self.cols
     }
 
+    /// Returns half of the width and of the height of the pad [m].
+    #[must_use]
+    pub fn half(&self) -> [f64; 2] {
+        [self.cols as f64 * self.pitch[0] / 2.0, self.rows as f64 * self.pitch[1] / 2.0]
+    }
+
     /// Returns the x coordinate of column `j` from the centre of the pad [m].
     #[must_use]
     pub fn x(&self, j: f64) -> f64 {

@@ -7,11 +7,11 @@ use nalgebra::{IsometryMatrix3, Vector3, Vector6};
 /// A twist in a sensor's frame is the velocity of the sensor's origin in the sensor's axes. A twist in `base` is
 /// spatial: the velocity at the base's origin (paper eq. 4).
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
+#[must_use]
 pub struct Twist(pub Vector6<f64>);
 
 impl Twist {
     /// Creates a twist from its linear part [m/s] and its angular part [rad/s].
-    #[must_use]
     pub fn new(linear: Vector3<f64>, angular: Vector3<f64>) -> Self {
         Self(Vector6::new(linear.x, linear.y, linear.z, angular.x, angular.y, angular.z))
     }

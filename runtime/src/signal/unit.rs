@@ -46,6 +46,7 @@ const NAMES: [(Base, &str); 10] = [
 
 /// A unit: a base, optionally per tactel and per a power of seconds.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
+#[must_use]
 pub struct Unit {
     /// The base.
     pub base: Base,
@@ -74,20 +75,17 @@ impl Unit {
     pub const RAW: Self = Self::of(Base::Raw);
 
     /// Creates a plain unit of a base.
-    #[must_use]
     pub const fn of(base: Base) -> Self {
         Self { base, per_tactel: false, per_second: 0 }
     }
 
     /// Returns this unit per second. The rate of an axial angle is in rad/s.
-    #[must_use]
     pub const fn per_second(self) -> Self {
         let base = if matches!(self.base, Base::Axial) { Base::Radian } else { self.base };
         Self { base, per_second: self.per_second + 1, ..self }
     }
 
     /// Returns this unit per tactel.
-    #[must_use]
     pub const fn per_tactel(self) -> Self {
         Self { per_tactel: true, ..self }
     }

@@ -21,6 +21,12 @@ macro_rules! codes {
             pub const fn name(self) -> &'static str {
                 match self { $(Self::$Code => $name),* }
             }
+
+            /// Returns the page that explains it, in Markdown.
+            #[must_use]
+            pub const fn page(self) -> &'static str {
+                match self { $(Self::$Code => include_str!(concat!("../../../docs/errors/", $name, ".md"))),* }
+            }
         }
     };
 }
@@ -199,6 +205,7 @@ impl fmt::Display for Code {
 
 /// One error or warning about a graph file.
 #[derive(Debug, Clone, PartialEq, Eq)]
+#[must_use]
 pub struct Diagnostic {
     /// The kind of diagnostic.
     pub code: Code,
@@ -233,7 +240,6 @@ impl Diagnostic {
     }
 
     /// Sets the help text.
-    #[must_use]
     pub fn help(mut self, help: impl Into<String>) -> Self {
         self.help = Some(help.into());
         self
@@ -242,7 +248,6 @@ impl Diagnostic {
     /// Sets the help for an unknown `name`: the closest of the `known` names, or all of them.
     ///
     /// `what` names the known things in the plural, for example "roles".
-    #[must_use]
     pub fn suggest<'n>(self, name: &str, known: impl Iterator<Item = &'n str>, what: &str) -> Self {
         let known: Vec<&str> = known.collect();
         match suggest_name(name, known.iter().copied()) {
@@ -252,21 +257,18 @@ impl Diagnostic {
     }
 
     /// Suggests `best` in place of `name`, which is marked.
-    #[must_use]
     pub fn instead(mut self, name: &str, best: &str) -> Self {
         self.fix.extend(inside(&self.span, name).map(|span| Edit::Replace(span, best.to_owned())));
         self.help(did_you_mean(best))
     }
 
     /// Adds a change that the help asks for.
-    #[must_use]
     pub fn edit(mut self, edit: Edit) -> Self {
         self.fix.push(edit);
         self
     }
 
     /// Sets or clears the help text.
-    #[must_use]
     pub(crate) fn with_help(self, help: Option<String>) -> Self {
         Self { help, ..self }
     }
@@ -277,7 +279,6 @@ impl Diagnostic {
     }
 
     /// Adds a related place with a label.
-    #[must_use]
     pub fn note(mut self, span: Range<usize>, text: impl Into<String>) -> Self {
         self.notes.push((span, text.into()));
         self

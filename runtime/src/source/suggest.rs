@@ -124,7 +124,8 @@ pub fn did_you_mean(name: &str) -> String {
 }
 
 /// Lists names in backticks, separated by commas.
-pub(crate) fn quoted<N: Display>(names: impl IntoIterator<Item = N>) -> String {
+#[must_use]
+pub fn quoted<N: Display>(names: impl IntoIterator<Item = N>) -> String {
     names.into_iter().map(|name| format!("`{name}`")).collect::<Vec<_>>().join(", ")
 }
 

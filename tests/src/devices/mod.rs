@@ -7,7 +7,6 @@ pub mod udp_pad;
 use tactflow_runtime::catalogue::Catalogue;
 
 /// The devices.
-#[must_use]
 pub fn catalogue() -> Catalogue {
     Catalogue::new()
         .role(udp_motor::role())

@@ -12,7 +12,6 @@ use tactflow_runtime::node::{Describe, Mistakes, Param, PortSpec};
 use tactflow_runtime::signal::{Joint, Joints, JointsShape, Kind, Unit};
 
 /// The role of a motor that wants to be moved.
-#[must_use]
 pub fn role() -> RoleType {
     let velocity = |name, doc| PortSpec::new(name, doc, Kind::Joints, &["rad/s", "self"]);
     RoleType {

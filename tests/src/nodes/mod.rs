@@ -19,7 +19,6 @@ use tactflow_runtime::node::PortSpec;
 use tactflow_runtime::signal::Kind;
 
 /// The nodes and the role.
-#[must_use]
 pub fn catalogue() -> Catalogue {
     Catalogue::new()
         .role(length())
@@ -47,7 +46,6 @@ fn length() -> RoleType {
 }
 
 /// The role `role` as a length that a test feeds, every 10 ms nominally.
-#[must_use]
 pub fn length_by_hand(role: &str) -> FedRole {
     FedRole::new(role, "length", 10.0)
 }

@@ -7,11 +7,10 @@
 use std::collections::BTreeMap;
 use std::ops::Range;
 
-use tactflow_runtime::node::{At, Mistake, Mistakes, Param, Reader, read_leaf};
+use tactflow_runtime::node::{At, Mistake, Mistakes, Param, Reader};
 use tactflow_runtime::signal::Unit;
 use tactflow_runtime::source::{Code, Item, SourceMap, Value, parse_table};
 
-use super::curve::KINDS;
 use super::{Calibration, CurveKind, ForceCurve, Tactel};
 
 /// Maximum number of mistakes that are reported for one file.
@@ -35,16 +34,6 @@ impl Param for Later {
 
     fn read(value: &Value, _: &mut Reader<'_>) -> Option<Self> {
         Some(Self(value.clone()))
-    }
-}
-
-impl Param for CurveKind {
-    const EXPECTS: &'static str = "`linear`, `rational` or `piecewise`";
-
-    fn read(value: &Value, reader: &mut Reader<'_>) -> Option<Self> {
-        let name: String = read_leaf(value, reader, Self::EXPECTS)?;
-        let found = KINDS.into_iter().find(|kind| kind.to_string() == name);
-        found.or_else(|| reader.wrong_type(value, Self::EXPECTS))
     }
 }
 

@@ -3,6 +3,7 @@
 use proptest::prelude::*;
 
 use super::*;
+use crate::calibration::curve::KINDS;
 
 fn read_back(calibration: &Calibration) -> Calibration {
     let text = write(calibration, "a test");
@@ -105,7 +106,7 @@ fn every_mistake_has_its_place() {
         (GOOD, "kind = \"calibration\"", "kind = \"bench\"", "\"bench\"", "this is not a calibration file"),
         (GOOD, "kind = \"calibration\"\n", "", "", "this is not a calibration file"),
         (GOOD, "version = 1", "version = 2", "2", "unsupported version 2: this tool reads version 1"),
-        (GOOD, "\"rational\"", "\"cubic\"", "\"cubic\"", "expected `linear`, `rational` or `piecewise`"),
+        (GOOD, "\"rational\"", "\"cubic\"", "\"cubic\"", "expected one of `linear`, `rational`, `piecewise`"),
         (GOOD, "\"rational\"", "\"linear\"", "squash", "`squash` is not a parameter here"),
         (GOOD, "rows = 2", "rows = 0", "0", "expected a whole number from 1"),
         (GOOD, "rows = 2", "row = 2", "row", "`row` is not a parameter here"),

@@ -6,13 +6,13 @@ use std::time::Duration;
 use async_trait::async_trait;
 use tactflow_runtime::device::{DeviceError, Link, Live, Output};
 use tactflow_runtime::signal::Image;
-use tokio::time::{Instant, sleep};
+use tokio::time::Instant;
 
-use super::messages::{Counts, Frame, Message};
-use super::port::Port;
+use super::messages::{Frame, Message};
+use super::port::BAUD;
 use super::sensors::{Pad, assign};
 use super::session::{Identity, Session};
-use crate::devices::link::{Address, Backoff};
+use crate::devices::link::{Address, Backoff, Connection, Counts};
 
 /// The driver of a device.
 pub(super) struct Agni {
@@ -100,10 +100,8 @@ impl Live for Agni {
             if self.frames() > published {
                 backoff.reset();
             }
-            let stopped = link.stopped();
-            tokio::select! {
-                () = sleep(backoff.wait()) => {}
-                () = stopped => break,
+            if !backoff.pause(&link).await {
+                break;
             }
         }
         if let Some(session) = &mut self.session {
@@ -139,7 +137,7 @@ impl Agni {
     }
 
     async fn session(&mut self, link: &mut Link) -> Result<Infallible, Ended> {
-        let port = Port::open(&self.address).await?;
+        let port = Connection::open(&self.address, BAUD, None).await?;
         let session = self.session.insert(Session::new(port));
         let Identity { config, serial } = session.greet().await?;
         self.serial = serial;

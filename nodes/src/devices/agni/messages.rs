@@ -6,6 +6,10 @@
 
 use std::fmt;
 
+use bytes::{Buf, BytesMut};
+
+use crate::devices::link::Counts;
+
 /// The beginning of each message.
 const HEADER: [u8; 2] = [0xF0, 0xC4];
 
@@ -115,25 +119,15 @@ impl fmt::Display for Fault {
 /// 8 bits alone takes one in 256 false beginnings for a frame.
 #[derive(Debug, Default)]
 pub(super) struct Messages {
-    bytes: Vec<u8>,
-    /// Number of bytes at the beginning that have been read.
-    read: usize,
+    /// Bytes that have not been read.
+    bytes: BytesMut,
+    /// The message that was read last.
+    last: BytesMut,
     /// Bytes of the payload of each sensor.
     payloads: Vec<usize>,
     /// Whether the last message ended where the next one begins.
     is_locked: bool,
     pub(super) counts: Counts,
-}
-
-/// What has been counted and is not reported yet.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
-pub(super) struct Counts {
-    /// Frames whose checksum is wrong.
-    pub(super) rejected: u64,
-    /// Times at which the beginning of a message was lost.
-    pub(super) resyncs: u64,
-    /// Bytes that belong to no message.
-    pub(super) skipped: u64,
 }
 
 /// What begins at the first byte that is not read.
@@ -149,8 +143,6 @@ enum Begin {
 impl Messages {
     /// Appends bytes. A message has at most 64 KiB, so no more than that and these bytes are kept.
     pub(super) fn push(&mut self, bytes: &[u8]) {
-        self.bytes.drain(..self.read);
-        self.read = 0;
         self.bytes.extend_from_slice(bytes);
     }
 
@@ -162,7 +154,7 @@ impl Messages {
     /// Forgets the bytes, as after a break of the connection.
     pub(super) fn clear(&mut self) {
         self.bytes.clear();
-        (self.read, self.is_locked) = (0, false);
+        self.is_locked = false;
     }
 
     /// Returns the next message, or `None` if more bytes are needed.
@@ -172,12 +164,10 @@ impl Messages {
                 Begin::Incomplete => return None,
                 Begin::Nothing => self.skip(),
                 Begin::Message(length) => {
-                    let (from, was_locked) = (self.read, self.is_locked);
-                    self.read += length;
-                    self.is_locked = true;
-                    let id = self.bytes[from + 2];
-                    if was_locked || !(ID_FIRST_SENSOR..=ID_LAST_SENSOR).contains(&id) {
-                        return Some(message(&self.bytes[from..from + length]));
+                    self.last = self.bytes.split_to(length);
+                    let was_locked = std::mem::replace(&mut self.is_locked, true);
+                    if was_locked || !(ID_FIRST_SENSOR..=ID_LAST_SENSOR).contains(&self.last[2]) {
+                        return Some(message(&self.last));
                     }
                 }
             }
@@ -186,14 +176,14 @@ impl Messages {
 
     /// Goes one byte on, because no message begins here.
     fn skip(&mut self) {
-        self.read += 1;
+        self.bytes.advance(1);
         self.counts.skipped += 1;
         self.counts.resyncs += u64::from(self.is_locked);
         self.is_locked = false;
     }
 
     fn begin(&mut self) -> Begin {
-        let bytes = &self.bytes[self.read..];
+        let bytes = &*self.bytes;
         if !bytes.iter().zip(&HEADER).all(|(byte, expected)| byte == expected) {
             return Begin::Nothing;
         }

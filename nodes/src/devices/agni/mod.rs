@@ -37,7 +37,7 @@ pub struct Params {
     /// The port: `serial:/dev/serial/by-id/…`, or `tcp:HOST:PORT` for a server that passes on a serial port.
     link: String,
     /// The sensors that the bench uses, one for each pad.
-    #[param(default = vec![SensorParams::first()])]
+    #[param(default = vec![SensorParams::default()])]
     sensors: Vec<SensorParams>,
     /// Layouts of other sensors, by their names.
     #[param(default = Map(std::collections::BTreeMap::new()))]
@@ -183,10 +183,11 @@ impl Params {
         facts.push(pad::mount(&self.mount));
         let layout = &pad.layout;
         let shape = ImageShape { rows: layout.rows, cols: layout.cols, pitch: [self.pitch; 2], unit: Unit::ONE };
-        Ok(match &pad.side {
-            Some(side) => pad::fill_on(description, side.clone(), shape, facts),
-            None => pad::fill(description, shape, facts),
-        })
+        let fill = match &pad.side {
+            Some(side) => description.fills_on(side.clone(), pad::ROLE),
+            None => description.fills(pad::ROLE),
+        };
+        Ok(pad::fill(fill, shape, facts))
     }
 }
 

@@ -10,6 +10,7 @@ use super::messages::{Config, SensorType, VERSION};
 
 /// A sensor of the device.
 #[derive(Debug, Clone, Param)]
+#[param(default)]
 pub(super) struct SensorParams {
     /// Name of the pad if the device has several, for the bench: `left_pad = "skin.left"`.
     side: Option<String>,
@@ -24,13 +25,6 @@ pub(super) struct SensorParams {
     /// bytes), or one of `layouts`.
     #[param(default = "myrmex_v2")]
     layout: String,
-}
-
-impl SensorParams {
-    /// The first Myrmex v2 of a device.
-    pub(super) fn first() -> Self {
-        Self { side: None, number: None, uid: None, layout: BUILTIN[0].to_owned() }
-    }
 }
 
 /// A pad of the bench.
@@ -152,7 +146,7 @@ mod tests {
         let none = Map(std::collections::BTreeMap::new());
         let device = config(&[(7, 192), (8, 512), (9, 512), (10, 40)]);
         for (sensors, expected) in [
-            (vec![SensorParams::first()], Ok(vec![None, Some(0), None, None])),
+            (vec![SensorParams::default()], Ok(vec![None, Some(0), None, None])),
             (vec![sensor("a", Some(3), None, "myrmex_v2")], Ok(vec![None, None, Some(0), None])),
             (
                 // The second one names the sensor that the first one would take.
@@ -179,7 +173,7 @@ mod tests {
         let messages = |sensors| -> Vec<String> {
             pads(sensors, &none).unwrap_err().into_iter().map(|mistake| mistake.message).collect()
         };
-        let first = SensorParams::first;
+        let first = SensorParams::default;
         assert_eq!(
             messages(vec![first(), sensor("a", None, None, "glove")]),
             ["the device has several sensors, so the sensor 1 needs a `side`"]

@@ -7,7 +7,7 @@ use tokio::time::{Instant, timeout_at};
 use super::messages::{
     ASK_CONFIG, ASK_SERIAL, ASK_TOPOLOGY, Config, Fault, Message, Messages, START, STOP, set_period,
 };
-use super::port::Port;
+use crate::devices::link::Connection;
 
 /// Time without a byte after which a stopped device has nothing more to say.
 const QUIET: Duration = Duration::from_millis(30);
@@ -29,7 +29,7 @@ pub(super) struct Identity {
 
 /// A connection to a device.
 pub(super) struct Session {
-    port: Port,
+    port: Connection,
     /// The bytes that have arrived last.
     arrived: Vec<u8>,
     pub(super) messages: Messages,
@@ -39,7 +39,7 @@ pub(super) struct Session {
 
 impl Session {
     /// Begins a session on a port.
-    pub(super) fn new(port: Port) -> Self {
+    pub(super) fn new(port: Connection) -> Self {
         Self { port, arrived: Vec::new(), messages: Messages::default(), fault: None }
     }
 

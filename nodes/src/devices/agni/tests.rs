@@ -6,9 +6,9 @@ use proptest::prelude::*;
 use tactflow_runtime::harness::LinkRig;
 use tokio::io::{AsyncReadExt, AsyncWriteExt, duplex};
 
-use super::port::Port;
 use super::session::Session;
 use super::*;
+use crate::devices::link::Connection;
 use crate::devices::testing::open;
 
 fn messages_of(params: &str) -> Vec<String> {
@@ -85,7 +85,7 @@ fn greet(answer: impl Fn(&[u8]) -> Vec<u8> + Send + 'static) -> (Result<session:
                 let _ = device.write_all(&answer(&bytes[..count])).await;
             }
         });
-        let mut session = Session::new(Port::Pipe(host));
+        let mut session = Session::new(Connection::Pipe(host));
         let identity = session.greet().await;
         if identity.is_ok() {
             session.start([1].into_iter(), Some(10)).await.unwrap();

@@ -3,6 +3,8 @@
 use std::io::{self, ErrorKind};
 use std::path::{Path, PathBuf};
 
+use tactflow_runtime::source::quoted;
+
 /// The names of the serial ports that stay the same when a port is plugged in again.
 const BY_ID: &str = "/dev/serial/by-id";
 
@@ -20,8 +22,7 @@ fn refusal_among(path: &str, error: &io::Error, ports: &[PathBuf]) -> String {
         }
         ErrorKind::NotFound if ports.is_empty() => "there is no such port: is the pad plugged in?".to_owned(),
         ErrorKind::NotFound => {
-            let names: Vec<String> = ports.iter().map(|port| format!("`{}`", port.display())).collect();
-            format!("there is no such port; plugged in is {}", names.join(", "))
+            format!("there is no such port; plugged in is {}", quoted(ports.iter().map(|port| port.display())))
         }
         ErrorKind::ResourceBusy => {
             "another program uses the port: close it; ModemManager opens new ports for some seconds, and `sudo \

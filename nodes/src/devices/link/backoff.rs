@@ -2,6 +2,9 @@
 
 use std::time::Duration;
 
+use tactflow_runtime::device::Link;
+use tokio::time::sleep;
+
 /// Time before the second attempt.
 const FIRST: Duration = Duration::from_millis(50);
 /// Longest time between two attempts.
@@ -19,10 +22,18 @@ impl Backoff {
     }
 
     /// Returns the time to wait now.
-    pub(crate) fn wait(&mut self) -> Duration {
+    fn wait(&mut self) -> Duration {
         let wait = self.next;
         self.next = (2 * wait).min(LONGEST);
         wait
+    }
+
+    /// Waits, and returns whether the run goes on.
+    pub(crate) async fn pause(&mut self, link: &Link) -> bool {
+        tokio::select! {
+            () = link.stopped() => false,
+            () = sleep(self.wait()) => true,
+        }
     }
 
     /// Begins again, after a success.

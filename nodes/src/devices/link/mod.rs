@@ -22,6 +22,17 @@ use tcp::Tcp;
 use udp::Udp;
 use websocket::WebSocket;
 
+/// What the reader of a stream of bytes has counted and not reported yet.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub(crate) struct Counts {
+    /// Frames that were refused, such as for a wrong checksum.
+    pub(crate) rejected: u64,
+    /// Times at which the beginning of a frame was lost.
+    pub(crate) resyncs: u64,
+    /// Bytes that belong to no frame.
+    pub(crate) skipped: u64,
+}
+
 /// Longest time for a connection to be made.
 const CONNECT_TIME: Duration = Duration::from_secs(5);
 /// Longest time for bytes to be sent.
@@ -35,6 +46,9 @@ pub(crate) enum Connection {
     Tcp(Tcp),
     Udp(Udp),
     WebSocket(Box<WebSocket>),
+    /// A pipe in memory.
+    #[cfg(test)]
+    Pipe(tokio::io::DuplexStream),
 }
 
 impl Connection {
@@ -67,6 +81,13 @@ impl Connection {
             Self::Tcp(stream) => stream.receive(buffer).await,
             Self::Udp(socket) => socket.receive(buffer).await,
             Self::WebSocket(socket) => socket.receive(buffer).await,
+            #[cfg(test)]
+            Self::Pipe(pipe) => {
+                buffer.resize(64, 0);
+                let count = tokio::io::AsyncReadExt::read(pipe, buffer).await.map_err(|error| error.to_string())?;
+                buffer.truncate(count);
+                if count == 0 { Err("the pipe is closed".to_owned()) } else { Ok(()) }
+            }
         }
     }
 
@@ -81,6 +102,10 @@ impl Connection {
                 Self::Tcp(stream) => stream.send(bytes).await,
                 Self::Udp(socket) => socket.send(bytes).await,
                 Self::WebSocket(socket) => socket.send(bytes).await,
+                #[cfg(test)]
+                Self::Pipe(pipe) => {
+                    tokio::io::AsyncWriteExt::write_all(pipe, bytes).await.map_err(|error| error.to_string())
+                }
             }
         };
         tokio::time::timeout(SEND_TIME, sent).await.unwrap_or_else(|_| Err("it takes no bytes".to_owned()))

@@ -13,7 +13,7 @@ use std::time::Duration;
 use tactflow_runtime::device::{Description, Device, Driver, OnSilence, Opened, Output};
 use tactflow_runtime::node::{At, Describe, FilePath, Mistake, Mistakes, Param};
 use tactflow_runtime::signal::{Image, ImageShape, Joint, JointsShape, Unit};
-use tactflow_runtime::source::Code;
+use tactflow_runtime::source::{Code, quoted};
 
 use super::arm::{self, ArmPorts};
 use super::{Facts, pad};
@@ -110,9 +110,9 @@ impl Device for Lockstep {
 fn describe(hello: &Hello, params: &Params) -> Result<(Description, Output<Image>, ArmPorts), Mistakes> {
     let mut description = Description::every((hello.dt * 1e9).round() * 1e-9);
     let shape = ImageShape { rows: hello.rows, cols: hello.cols, pitch: [hello.pitch; 2], unit: Unit::RAW };
-    let image = pad::fill(&mut description, shape, pad_facts(hello));
+    let image = pad::fill(description.fills(pad::ROLE), shape, pad_facts(hello));
     let joints = joints(hello, params.acceleration);
-    let arm = ArmPorts::fill(&mut description, &joints, model_facts(hello, params)?);
+    let arm = ArmPorts::fill(description.fills(arm::ROLE), &joints, model_facts(hello, params)?);
     description.on_silence(OnSilence::Holds, free::COMMAND_TIMEOUT.as_secs_f64());
     Ok((description, image, arm))
 }
@@ -202,6 +202,5 @@ fn model(name: &str) -> Option<FilePath> {
 
 /// Returns the names of the built-in models.
 fn models() -> String {
-    let names = builtin::FILES.iter().filter_map(|(file, _)| file.strip_suffix(".urdf"));
-    names.map(|name| format!("`{name}`")).collect::<Vec<_>>().join(", ")
+    quoted(builtin::FILES.iter().filter_map(|(file, _)| file.strip_suffix(".urdf")))
 }

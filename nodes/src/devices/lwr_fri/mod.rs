@@ -76,7 +76,7 @@ pub struct Params {
     #[param(unit = "rad")]
     start: Option<Vec<f64>>,
     /// Bounds of the checks before the first command.
-    #[param(default = StartBounds::DEFAULT)]
+    #[param(default = StartBounds::default())]
     start_bounds: StartBounds,
     /// Time that the controller has to reach the state command after it has sent its first measurement. The arm rests
     /// meanwhile.
@@ -179,7 +179,7 @@ fn opened(params: Params) -> Result<(Description, Fri), Mistakes> {
     let mut facts = arm::facts(&params.urdf, &params.tip, params.home.as_deref())?;
     let stiffest = stiffness.map(|joints| joints.into_iter().fold(0.0, f64::max));
     facts.extend(stiffest.map(|stiffest| ("joint_n_m_per_rad".into(), stiffest.into())));
-    let ports = ArmPorts::fill(&mut description, &shape, facts);
+    let ports = ArmPorts::fill(description.fills(arm::ROLE), &shape, facts);
     let weight = ToolWeight::new(params.tool_mass, params.tool_com);
     let force = WrenchPorts::fill(&mut description, [vec![pad::mount(&Mount::NONE)], weight.facts()].concat());
     let settings = Settings {

@@ -126,7 +126,7 @@ impl Device for MockPad {
         let calibration = toml::Table::from_iter([("gain".to_owned(), 1.0.into())]);
         let mut facts = pad::facts(params.threshold, params.pressure, params.unit, calibration);
         facts.push(pad::mount(&params.mount));
-        let image = pad::fill(&mut description, shape.clone(), facts);
+        let image = pad::fill(description.fills(pad::ROLE), shape.clone(), facts);
         let pad = Self::new(image, shape, period, params);
         Ok(Opened { description, driver: Driver::Stepped(Box::new(pad)) })
     }

@@ -5,7 +5,7 @@ use std::time::{Duration, Instant};
 use async_trait::async_trait;
 use tactflow_runtime::device::{DeviceError, Link, Live, Output};
 use tactflow_runtime::signal::Image;
-use tokio::time::{sleep, sleep_until, timeout};
+use tokio::time::{sleep_until, timeout};
 
 use super::plan::Plan;
 use super::reader::{Reader, Tally};
@@ -25,7 +25,6 @@ const MIN_PAUSE: Duration = Duration::from_millis(1);
 /// A pad that is described and ready to run.
 pub(super) struct PadDriver {
     image: Output<Image>,
-    plan: Plan,
     reader: Reader,
     /// The newest image.
     cells: Vec<f32>,
@@ -37,22 +36,16 @@ pub(super) struct PadDriver {
     rejected: u64,
 }
 
-/// Why a connection has ended.
-enum End {
-    Run,
-    Lost(String),
-}
-
 #[async_trait]
 impl Live for PadDriver {
     async fn run(mut self: Box<Self>, mut link: Link) -> Result<(), DeviceError> {
         let (mut backoff, mut was_open) = (Backoff::new(), false);
         loop {
-            let stopped = link.stopped();
+            let (stopped, plan) = (link.stopped(), self.plan());
             let opened = tokio::select! {
                 biased;
                 () = stopped => return Ok(()),
-                opened = Connection::open(&self.plan.address, self.plan.baud, self.plan.from) => opened,
+                opened = Connection::open(&plan.address, plan.baud, plan.from) => opened,
             };
             let why = match opened {
                 Ok(mut connection) => {
@@ -60,21 +53,19 @@ impl Live for PadDriver {
                         link.count("reconnects");
                     }
                     match self.follow(&mut connection, &mut link, &mut backoff).await {
-                        End::Run => {
+                        Ok(()) => {
                             // Nothing can be done if the pad does not take it.
-                            let _ = timeout(STOP_TIME, connection.send(&self.plan.stop)).await;
+                            let _ = timeout(STOP_TIME, connection.send(&self.plan().stop)).await;
                             return Ok(());
                         }
-                        End::Lost(why) => why,
+                        Err(why) => why,
                     }
                 }
                 Err(why) => why,
             };
             self.lose(&mut link, &why);
-            let stopped = link.stopped();
-            tokio::select! {
-                () = stopped => return Ok(()),
-                () = sleep(backoff.wait()) => {}
+            if !backoff.pause(&link).await {
+                return Ok(());
             }
         }
     }
@@ -82,22 +73,32 @@ impl Live for PadDriver {
 
 impl PadDriver {
     pub(super) fn new(image: Output<Image>, plan: Plan) -> Self {
-        let (reader, cells) = (Reader::new(&plan), vec![0.0; plan.size[0] * plan.size[1]]);
-        let received = Vec::with_capacity(RECEIVED_BYTES);
-        Self { image, plan, reader, cells, received, is_lost: false, strange: 0, rejected: 0 }
+        let reader = Reader::new(plan);
+        let (cells, received) = (reader.cells(), Vec::with_capacity(RECEIVED_BYTES));
+        Self { image, reader, cells, received, is_lost: false, strange: 0, rejected: 0 }
     }
 
-    /// Publishes images until the run or the connection ends.
-    async fn follow(&mut self, connection: &mut Connection, link: &mut Link, backoff: &mut Backoff) -> End {
+    const fn plan(&self) -> &Plan {
+        &self.reader.plan
+    }
+
+    /// Publishes images until the run ends.
+    ///
+    /// # Errors
+    /// Why the connection has ended before.
+    async fn follow(
+        &mut self,
+        connection: &mut Connection,
+        link: &mut Link,
+        backoff: &mut Backoff,
+    ) -> Result<(), String> {
         self.reader.forget();
-        if let Err(why) = connection.send(&self.plan.start).await {
-            return End::Lost(why);
-        }
-        let pause = (self.plan.period / 4).max(MIN_PAUSE);
+        connection.send(&self.plan().start).await?;
+        let pause = (self.plan().period / 4).max(MIN_PAUSE);
         let (mut heard, mut read, mut poll_at) = (Instant::now(), Instant::now(), Instant::now());
         // When a question that has no answer is asked again.
         let mut again = Instant::now();
-        let mut patience = self.plan.timeout.max(FIRST_FRAME_TIME);
+        let mut patience = self.plan().timeout.max(FIRST_FRAME_TIME);
         let stopped = link.stopped();
         tokio::pin!(stopped);
         loop {
@@ -105,34 +106,28 @@ impl PadDriver {
             let limit = heard + if self.is_lost { REOPEN_TIME } else { patience };
             tokio::select! {
                 biased;
-                () = &mut stopped => return End::Run,
+                () = &mut stopped => return Ok(()),
                 // Before the bytes: a flood of them must not keep the clock from running.
-                () = sleep_until(ask_at.into()), if self.plan.poll.is_some() => {
-                    poll_at = (poll_at + self.plan.period).max(Instant::now());
-                    again = Instant::now() + (5 * self.plan.period).max(REPLY_TIME);
-                    if let Err(why) = self.ask(connection).await {
-                        return End::Lost(why);
-                    }
+                () = sleep_until(ask_at.into()), if self.plan().poll.is_some() => {
+                    poll_at = (poll_at + self.plan().period).max(Instant::now());
+                    again = Instant::now() + (5 * self.plan().period).max(REPLY_TIME);
+                    self.ask(connection).await?;
                 }
                 () = sleep_until(limit.into()) => {
                     let why = self.silence(heard.elapsed());
                     if self.is_lost {
-                        return End::Lost(why);
+                        return Err(why);
                     }
                     self.lose(link, &why);
                     // A pad that was without power waits for this again.
-                    if let Err(why) = connection.send(&self.plan.start).await {
-                        return End::Lost(why);
-                    }
+                    connection.send(&self.plan().start).await?;
                 }
                 received = connection.receive(&mut self.received) => {
-                    if let Err(why) = received {
-                        return End::Lost(why);
-                    }
+                    received?;
                     let is_after_pause = read.elapsed() > pause;
                     read = Instant::now();
                     if self.read(connection, link, is_after_pause) {
-                        (heard, patience) = (Instant::now(), self.plan.timeout);
+                        (heard, patience) = (Instant::now(), self.plan().timeout);
                         backoff.reset();
                     }
                 }
@@ -143,7 +138,7 @@ impl PadDriver {
     /// Asks for a frame.
     async fn ask(&mut self, connection: &mut Connection) -> Result<(), String> {
         self.reader.ask();
-        connection.send(self.plan.poll.as_deref().unwrap_or_default()).await
+        connection.send(self.plan().poll.as_deref().unwrap_or_default()).await
     }
 
     /// Publishes the images in what was received. Returns whether there is one.
@@ -188,14 +183,14 @@ impl PadDriver {
 
     fn lose(&mut self, link: &mut Link, why: &str) {
         self.is_lost = true;
-        link.lost(self.image, format!("{}: {why}", self.plan.address));
+        link.lost(self.image, format!("{}: {why}", self.plan().address));
     }
 
     /// Says why there is no frame.
     fn silence(&self, since: Duration) -> String {
         let silent = format!("no frame for {} ms", since.as_millis());
         if self.strange == 0 {
-            let is_asked = !self.plan.start.is_empty() || self.plan.poll.is_some();
+            let is_asked = !self.plan().start.is_empty() || self.plan().poll.is_some();
             let asked = match is_asked {
                 true => " and does not answer: check `baud`, and whether `start` or `poll` must end with a line break",
                 false => ": check `baud`, and whether the pad waits for a `start` or a `poll`",
@@ -208,7 +203,7 @@ impl PadDriver {
                  `plausible` identifies the right one"
             );
         }
-        if self.rejected > 0 && self.plan.has_check {
+        if self.rejected > 0 && self.plan().has_check {
             return format!(
                 "{silent}: {} bytes came with {} frames that have no right checksum; check `check`, `check_from` and \
                  `check_order`, and that `length` and `mark` are right",

@@ -11,8 +11,8 @@ use super::reader::Reader;
 pub(crate) fn listen(params: &Params) -> Result<impl Fn(&[&[u8]]) -> Vec<String> + use<>, Mistakes> {
     let plan = Plan::new(params)?;
     Ok(move |pieces: &[&[u8]]| {
-        let (mut reader, mut heard) = (Reader::new(&plan), Vec::new());
-        let mut cells = vec![0.0; plan.size[0] * plan.size[1]];
+        let (mut reader, mut heard) = (Reader::new(plan.clone()), Vec::new());
+        let mut cells = reader.cells();
         for piece in pieces {
             if plan.poll.is_some() {
                 reader.ask();

@@ -77,7 +77,7 @@ impl Device for Stream {
         let shape = ImageShape { rows, cols, pitch: [params.pitch; 2], unit: params.unit };
         let mut description = Description::every(1.0 / params.rate_hz);
         description.latency = params.latency_ms * 1e-3;
-        let stream = Self { image: pad::fill(&mut description, shape, facts(&params)?) };
+        let stream = Self { image: pad::fill(description.fills(pad::ROLE), shape, facts(&params)?) };
         let driver = PadDriver::new(stream.image, plan);
         Ok(Opened { description, driver: Driver::Live(Box::new(driver)) })
     }

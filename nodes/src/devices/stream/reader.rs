@@ -1,20 +1,14 @@
 //! From bytes as they arrive to images: framing, decoding, parts and the clock of the pad, without I/O.
 
-use super::decoding::clock::{Counter, Sequence, Stamps};
-use super::decoding::decoder::{Decoder, Image};
+use super::decoding::clock::{Counter, Sequence};
+use super::decoding::decoder::Decoder;
 use super::decoding::parts::Parts;
-use super::framing::{Counts, Framer};
+use super::framing::Counts;
 use super::plan::Plan;
 
 /// Reads images from bytes.
 pub(super) struct Reader {
-    framer: Framer,
-    decoder: Decoder,
-    parts: Option<Parts>,
-    image: Image,
-    stamps: Option<Stamps>,
-    counter: Option<Counter>,
-    repeats_are_new: bool,
+    pub(super) plan: Plan,
     /// The values of the frame, those of all parts.
     values: Vec<f64>,
     /// The values of one part, for a look at frames that may be none.
@@ -52,54 +46,44 @@ pub(super) struct Read {
 }
 
 impl Reader {
-    pub(super) fn new(plan: &Plan) -> Self {
-        let count = plan.decoder.layout.count;
-        Self {
-            framer: plan.framer.clone(),
-            decoder: plan.decoder.clone(),
-            parts: plan.parts.clone(),
-            image: plan.image.clone(),
-            stamps: plan.stamps.clone(),
-            counter: plan.counter.clone(),
-            repeats_are_new: plan.repeats_are_new,
-            values: vec![0.0; plan.values],
-            part: vec![0.0; count],
-            last: Vec::new(),
-            has_last: false,
-            current: Vec::new(),
-            number: 0,
-            counts: Counts::default(),
-            tally: Tally::default(),
-        }
+    pub(super) fn new(plan: Plan) -> Self {
+        let (values, part) = (vec![0.0; plan.values], vec![0.0; plan.decoder.layout.count]);
+        let (last, current, counts) = (Vec::new(), Vec::new(), Counts::default());
+        Self { plan, values, part, last, has_last: false, current, number: 0, counts, tally: Tally::default() }
+    }
+
+    /// Returns a buffer for an image.
+    pub(super) fn cells(&self) -> Vec<f32> {
+        vec![0.0; self.plan.size[0] * self.plan.size[1]]
     }
 
     /// Adds bytes that have arrived; `is_after_pause` says that nothing had arrived for a while before.
     pub(super) fn push(&mut self, bytes: &[u8], is_after_pause: bool) {
-        self.framer.push(bytes, is_after_pause);
+        self.plan.framer.push(bytes, is_after_pause);
     }
 
     /// States that a frame is asked for now.
     pub(super) fn ask(&mut self) {
-        self.framer.ask();
+        self.plan.framer.ask();
     }
 
     /// Whether a frame was asked for and has not come.
     pub(super) const fn is_waiting(&self) -> bool {
-        self.framer.is_waiting()
+        self.plan.framer.is_waiting()
     }
 
     /// Whether the mark stands at several places of every frame.
     pub(super) const fn is_ambiguous(&self) -> bool {
-        self.framer.is_ambiguous()
+        self.plan.framer.is_ambiguous()
     }
 
     /// Forgets what has arrived, as after a new connection.
     pub(super) fn forget(&mut self) {
-        self.framer.forget();
-        if let Some(parts) = &mut self.parts {
+        self.plan.framer.forget();
+        if let Some(parts) = &mut self.plan.parts {
             parts.forget();
         }
-        self.counter.iter_mut().for_each(Counter::forget);
+        self.plan.counter.iter_mut().for_each(Counter::forget);
         self.has_last = false;
         self.current.clear();
     }
@@ -107,8 +91,8 @@ impl Reader {
     /// Writes the next image into `cells`. Returns `None` if more bytes are needed.
     pub(super) fn next(&mut self, cells: &mut [f32]) -> Option<Read> {
         loop {
-            let Self { framer, decoder, parts, part, .. } = self;
-            let mut is_sound = |frame: &[u8]| is_sound(frame, decoder, parts.as_ref(), part);
+            let Plan { framer, decoder, parts, stamps, counter, .. } = &mut self.plan;
+            let mut is_sound = |frame: &[u8]| is_sound(frame, decoder, parts.as_ref(), &mut self.part);
             let frame = framer.next(&mut is_sound);
             // The values of `part` become those of the frame.
             if let Some(frame) = frame {
@@ -119,12 +103,12 @@ impl Reader {
                 return None;
             };
             self.current.extend_from_slice(frame);
-            let stamp = self.stamps.as_ref().and_then(|stamps| self.decoder.beside(frame, stamps.place()));
-            let counter = self.counter.as_ref().and_then(|counter| self.decoder.beside(frame, counter.place()));
-            let number = self.parts.as_ref().and_then(|parts| self.decoder.beside(frame, parts.place()));
+            let stamp = stamps.as_ref().and_then(|stamps| decoder.beside(frame, stamps.place()));
+            let counter = counter.as_ref().and_then(|counter| decoder.beside(frame, counter.place()));
+            let number = parts.as_ref().and_then(|parts| decoder.beside(frame, parts.place()));
             let is_broken = self.count_framing();
             if self.gather(number.map(|number| number.whole()), counter.map(|counter| counter.whole()), is_broken) {
-                let time = self.stamps.as_mut().and_then(|stamps| Some(stamps.time(stamp?)));
+                let time = self.plan.stamps.as_mut().and_then(|stamps| Some(stamps.time(stamp?)));
                 if let Some(read) = self.judge(counter.map(|counter| counter.whole()), time, cells) {
                     return Some(read);
                 }
@@ -135,7 +119,7 @@ impl Reader {
     /// Adds the part that was read to the frame. Returns whether the frame is complete. `is_broken` says that bytes
     /// before this part are missing.
     fn gather(&mut self, number: Option<u64>, counter: Option<u64>, is_broken: bool) -> bool {
-        let Some(parts) = &mut self.parts else {
+        let Some(parts) = &mut self.plan.parts else {
             self.values.copy_from_slice(&self.part);
             return true;
         };
@@ -143,7 +127,7 @@ impl Reader {
         if is_broken && parts.forget() {
             self.tally.rejected += 1;
         }
-        let follows = |new, old| self.counter.as_ref().is_none_or(|counter| counter.continues(new, old));
+        let follows = |new, old| self.plan.counter.as_ref().is_none_or(|counter| counter.continues(new, old));
         let gathered = parts.gather(part, counter, follows);
         if gathered.is_spoiled {
             self.tally.rejected += 1;
@@ -156,15 +140,15 @@ impl Reader {
 
     /// Decides whether a complete frame is new, and writes its image.
     fn judge(&mut self, counter: Option<u64>, time: Option<i64>, cells: &mut [f32]) -> Option<Read> {
-        let step = self.parts.as_mut().map_or(1, Parts::take_step);
+        let step = self.plan.parts.as_mut().map_or(1, Parts::take_step);
         let is_same = std::mem::replace(&mut self.has_last, true) && self.last == self.current;
         std::mem::swap(&mut self.last, &mut self.current);
         self.current.clear();
-        if !self.image.write(&self.values, cells) {
+        if !self.plan.image.write(&self.values, cells) {
             self.tally.rejected += 1;
             return None;
         }
-        match (&mut self.counter, counter) {
+        match (&mut self.plan.counter, counter) {
             (Some(known), Some(counter)) => match known.judge(counter, step) {
                 Sequence::New { number, lost } => {
                     self.tally.lost += lost;
@@ -178,7 +162,7 @@ impl Reader {
             },
             _ => {
                 self.tally.repeated += u64::from(is_same);
-                self.number += u64::from(!is_same || self.repeats_are_new);
+                self.number += u64::from(!is_same || self.plan.repeats_are_new);
             }
         }
         self.tally.frames += 1;
@@ -187,7 +171,8 @@ impl Reader {
 
     /// Adds what framing has counted. Returns whether bytes or frames were dropped.
     fn count_framing(&mut self) -> bool {
-        let (new, old) = (self.framer.counts(), std::mem::replace(&mut self.counts, self.framer.counts()));
+        let new = self.plan.framer.counts();
+        let old = std::mem::replace(&mut self.counts, new);
         self.tally.rejected += new.rejected - old.rejected;
         self.tally.resyncs += new.resyncs - old.resyncs;
         self.tally.skipped += new.skipped - old.skipped;

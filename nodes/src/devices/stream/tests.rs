@@ -154,7 +154,8 @@ impl Pad {
     fn new(text: &str) -> Self {
         let params: Params = read(text);
         let plan = Plan::new(&params).unwrap_or_else(|mistakes| panic!("{mistakes:#?}"));
-        Self { reader: Reader::new(&plan), cells: vec![0.0; plan.size[0] * plan.size[1]] }
+        let reader = Reader::new(plan);
+        Self { cells: reader.cells(), reader }
     }
 
     /// Returns the images in some bytes.

@@ -84,7 +84,7 @@ mod tests {
     fn checks() -> Checks {
         let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../graphs/robots/ur5e.urdf").into();
         let chain = load(&FilePath { path, span: 0..0, builtin: None }, "tool0", &Mount::NONE).unwrap();
-        let start = StartCheck::new(chain, StartBounds::DEFAULT, None);
+        let start = StartCheck::new(chain, StartBounds::default(), None);
         Checks { start, order: ORDER, base: geometry::base(0.0), tcp_offset: None, tool_mass: None }
     }
 

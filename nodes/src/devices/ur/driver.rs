@@ -10,7 +10,7 @@ use super::course::Phase;
 use super::program::Listeners;
 use super::robot::Robot;
 use super::rtde::{Failure, Stream};
-use super::session::{End, Session};
+use super::session::Session;
 
 /// Time between two attempts to connect.
 const RETRY: Duration = Duration::from_millis(500);
@@ -22,21 +22,23 @@ impl Live for Robot {
         let (mut phase, mut is_first) = (Phase::start(), true);
         loop {
             let Some(stream) = idle(&mut link, Stream::open(&self.request)).await else { return Ok(()) };
-            let end = match stream {
+            let served = match stream {
                 Ok(stream) => {
                     if matches!(phase, Phase::Starting { .. }) {
                         // The time until the robot answers is not that of its program.
                         phase = Phase::start();
                     }
-                    let end = self.serve(stream, &mut listeners, (phase, &mut is_first), &mut link).await?;
-                    phase = Phase::Refused;
-                    end
+                    let start = std::mem::replace(&mut phase, Phase::Refused);
+                    self.serve(stream, &mut listeners, (start, &mut is_first), &mut link).await
                 }
+                Err(failure) => Err(failure),
+            };
+            let why = match served {
+                Ok(()) => return Ok(()),
                 Err(Failure::Final(why)) => return Err(self.failure(&why)),
                 Err(Failure::Without(_)) => return Err(self.failure("it does not know its own outputs")),
-                Err(Failure::Again(why)) => End::Lost(why),
+                Err(Failure::Again(why)) => why,
             };
-            let End::Lost(why) = end else { return Ok(()) };
             link.count("reconnects");
             let why = self.failure(&why).0;
             link.refuse(why.clone());
@@ -50,35 +52,38 @@ impl Live for Robot {
 }
 
 impl Robot {
-    /// Follows the robot on a connection, until the run or the connection ends. `is_first` is whether no velocity has
-    /// moved the robot in this run.
+    /// Follows the robot on a connection, until the run ends. `is_first` is whether no velocity has moved the robot in
+    /// this run.
+    ///
+    /// # Errors
+    /// Why the connection has ended before, or that the program cannot be written.
     async fn serve(
         &self,
         stream: Stream,
         listeners: &mut Listeners,
         (phase, is_first): (Phase, &mut bool),
         link: &mut Link,
-    ) -> Result<End, DeviceError> {
+    ) -> Result<(), Failure> {
         let own = stream.own_address().map(|address| address.to_string());
         let Ok(host) = self.host.clone().map_or(own, Ok) else {
-            return Ok(End::Lost("the connection has no address of its own".into()));
+            return Err(Failure::Again("the connection has no address of its own".into()));
         };
         let Ok(peer) = self.peer.map_or_else(|| stream.peer_address(), Ok) else {
-            return Ok(End::Lost("the connection is closed".into()));
+            return Err(Failure::Again("the connection is closed".into()));
         };
         if !self.sends_program && !link.is_mute() {
             let ports = self.script_ports(&host, listeners);
-            let body = self.script.body(&ports, stream.version).map_err(|why| self.failure(&why))?;
+            let body = self.script.body(&ports, stream.version).map_err(Failure::Final)?;
             listeners.serve(Arc::from(body), peer);
         }
         let mut session = Session::new(self, listeners, stream, (host, peer), (phase, *is_first));
         let end = session.follow(link).await;
         *is_first = session.is_first;
-        if matches!(end, End::Lost(_)) {
+        if end.is_err() {
             // Nobody sees what the robot does now, so its program is to end.
             session.abort();
         }
-        Ok(end)
+        end.map_err(Failure::Again)
     }
 }
 

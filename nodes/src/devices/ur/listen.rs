@@ -22,7 +22,7 @@ pub(crate) fn listen(pieces: &[&[u8]]) -> Vec<String> {
             };
             heard.push(match command {
                 packet::OUTPUTS => {
-                    let read = Recipe::read(&Output::ALL, payload);
+                    let read = Recipe::read(&Output::all(), payload);
                     let said = format!("{read:?}");
                     recipe = read.ok();
                     said

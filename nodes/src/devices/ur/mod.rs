@@ -121,7 +121,7 @@ pub struct Params {
     #[param(unit = "rad")]
     start: Option<Vec<f64>>,
     /// Bounds of the checks before the first command.
-    #[param(default = StartBounds::DEFAULT)]
+    #[param(default = StartBounds::default())]
     start_bounds: StartBounds,
     /// Our address, as the robot sees it; that of our connection to the robot if not given.
     host: Option<String>,
@@ -212,7 +212,7 @@ impl Device for Ur {
         let script = params.script.as_ref().map_or_else(|| Ok(Script::own()), Script::vendor)?;
         let mut description = Description::every(1.0 / params.rate_hz);
         let facts = arm::facts(&params.urdf, &params.tip, params.home.as_deref())?;
-        let ports = ArmPorts::fill(&mut description, &joints, facts);
+        let ports = ArmPorts::fill(description.fills(arm::ROLE), &joints, facts);
         let force = WrenchPorts::fill(&mut description, vec![pad::mount(&Mount::NONE)]);
         description.on_silence(OnSilence::Stops, silence(timeout_ms, params.rate_hz, &joints));
         description.needs_commissioning = true;

@@ -1,5 +1,7 @@
 //! Packets of RTDE: `size u16 | command u8 | payload`, big-endian. The size counts the whole packet.
 
+use bytes::BytesMut;
+
 /// Bytes before the payload.
 const HEADER: usize = 3;
 /// Largest packet that its size can state [bytes].
@@ -35,27 +37,26 @@ pub(super) fn outputs_request(rate_hz: f64, names: &[&str]) -> Vec<u8> {
 /// Splits a stream of bytes into packets, wherever it is cut.
 #[derive(Debug)]
 pub(super) struct Splitter {
-    /// Bytes that are not taken yet, from `begin`. At most a part of one packet is left between two calls of `feed`.
-    bytes: Vec<u8>,
-    begin: usize,
+    /// Bytes that are not taken yet. At most a part of one packet is left between two calls of `feed`.
+    bytes: BytesMut,
+    /// The packet that was taken last.
+    packet: BytesMut,
 }
 
 impl Splitter {
     /// A splitter that is fed at most `most` bytes at once.
     pub(super) fn new(most: usize) -> Self {
-        Self { bytes: Vec::with_capacity(MAX_PACKET + most), begin: 0 }
+        Self { bytes: BytesMut::with_capacity(MAX_PACKET + most), packet: BytesMut::new() }
     }
 
     /// Adds bytes that have arrived. All whole packets must have been taken before.
     pub(super) fn feed(&mut self, bytes: &[u8]) {
-        self.bytes.drain(..self.begin);
-        self.begin = 0;
         self.bytes.extend_from_slice(bytes);
     }
 
     /// Whether a part of a packet has arrived.
     pub(super) fn is_in_a_packet(&self) -> bool {
-        self.begin < self.bytes.len()
+        !self.bytes.is_empty()
     }
 
     /// Takes the next whole packet: its command and its payload.
@@ -63,18 +64,16 @@ impl Splitter {
     /// # Errors
     /// If a packet states a size that is smaller than its header. What follows cannot be read.
     pub(super) fn take(&mut self) -> Result<Option<(u8, &[u8])>, String> {
-        let rest = &self.bytes[self.begin..];
-        let Some((size, _)) = rest.split_first_chunk::<2>() else { return Ok(None) };
+        let Some(size) = self.bytes.first_chunk::<2>() else { return Ok(None) };
         let size = usize::from(u16::from_be_bytes(*size));
         if size < HEADER {
             return Err(format!("a packet states a size of {size} bytes, but its header has {HEADER}"));
         }
-        if rest.len() < size {
+        if self.bytes.len() < size {
             return Ok(None);
         }
-        let begin = self.begin;
-        self.begin += size;
-        Ok(Some((self.bytes[begin + 2], &self.bytes[begin + HEADER..begin + size])))
+        self.packet = self.bytes.split_to(size);
+        Ok(Some((self.packet[2], &self.packet[HEADER..])))
     }
 }
 

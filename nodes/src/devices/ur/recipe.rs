@@ -4,7 +4,7 @@
 pub(super) const JOINTS: usize = 6;
 
 /// The state of the robot in one cycle of the controller. Joints are in the order of the controller.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub(super) struct State {
     /// Time since the controller was started [s].
     pub(super) time: f64,
@@ -45,38 +45,30 @@ pub(super) enum Output {
 }
 
 impl Output {
-    /// All outputs that the driver asks for.
-    pub(super) const ALL: [Self; 12] = [
-        Self::Time,
-        Self::Q,
-        Self::TargetQ,
-        Self::TcpPose,
-        Self::TcpForce,
-        Self::TcpOffset,
-        Self::Payload,
-        Self::RobotMode,
-        Self::SafetyMode,
-        Self::RuntimeState,
-        Self::SpeedScaling,
-        Self::SpeedFraction,
+    /// All outputs that the driver asks for, each with its name in the protocol, in the order of the variants.
+    const NAMES: [(Self, &'static str); 12] = [
+        (Self::Time, "timestamp"),
+        (Self::Q, "actual_q"),
+        (Self::TargetQ, "target_q"),
+        (Self::TcpPose, "actual_TCP_pose"),
+        (Self::TcpForce, "actual_TCP_force"),
+        (Self::TcpOffset, "tcp_offset"),
+        (Self::Payload, "payload"),
+        (Self::RobotMode, "robot_mode"),
+        (Self::SafetyMode, "safety_mode"),
+        (Self::RuntimeState, "runtime_state"),
+        (Self::SpeedScaling, "speed_scaling"),
+        (Self::SpeedFraction, "target_speed_fraction"),
     ];
+
+    /// Returns all outputs that the driver asks for.
+    pub(super) fn all() -> [Self; 12] {
+        Self::NAMES.map(|(output, _)| output)
+    }
 
     /// Returns the name in the protocol.
     pub(super) const fn name(self) -> &'static str {
-        match self {
-            Self::Time => "timestamp",
-            Self::Q => "actual_q",
-            Self::TargetQ => "target_q",
-            Self::TcpPose => "actual_TCP_pose",
-            Self::TcpForce => "actual_TCP_force",
-            Self::TcpOffset => "tcp_offset",
-            Self::Payload => "payload",
-            Self::RobotMode => "robot_mode",
-            Self::SafetyMode => "safety_mode",
-            Self::RuntimeState => "runtime_state",
-            Self::SpeedScaling => "speed_scaling",
-            Self::SpeedFraction => "target_speed_fraction",
-        }
+        Self::NAMES[self as usize].1
     }
 
     /// Whether the driver can do without it. Old controllers do not have `tcp_offset` and `payload`.
@@ -174,7 +166,7 @@ impl Recipe {
         if *id != self.id || rest.len() != self.size {
             return None;
         }
-        let mut state = State::EMPTY;
+        let mut state = State::default();
         let mut slider = None;
         for (output, kind) in &self.values {
             let (value, later) = rest.split_at_checked(kind.size())?;
@@ -198,22 +190,6 @@ impl Recipe {
         state.speed_fraction = slider.unwrap_or(state.speed_fraction);
         Some(state)
     }
-}
-
-impl State {
-    const EMPTY: Self = Self {
-        time: 0.0,
-        q: [0.0; JOINTS],
-        target_q: [0.0; JOINTS],
-        tcp_pose: [0.0; 6],
-        tcp_force: None,
-        tcp_offset: None,
-        payload: None,
-        robot_mode: 0,
-        safety_mode: 0,
-        runtime_state: 0,
-        speed_fraction: 0.0,
-    };
 }
 
 /// Returns why an output cannot be used, and what to do.
@@ -263,6 +239,11 @@ mod tests {
         [&[1], types.as_bytes()].concat()
     }
 
+    #[test]
+    fn the_names_are_in_the_order_of_the_variants() {
+        assert!(Output::all().iter().enumerate().all(|(i, output)| *output as usize == i));
+    }
+
     /// The sizes of samples that the protocol states: header, recipe and values.
     #[test]
     fn a_sample_has_the_size_of_its_types() {
@@ -277,7 +258,7 @@ mod tests {
 
     #[test]
     fn every_value_comes_from_its_place() {
-        let recipe = Recipe::read(&Output::ALL, &answer(ALL_TYPES)).unwrap();
+        let recipe = Recipe::read(&Output::all(), &answer(ALL_TYPES)).unwrap();
         let mut sample = vec![1];
         sample.extend((1..=32).flat_map(|i| f64::from(i).to_be_bytes()));
         sample.extend([7, 1, 2].iter().flat_map(|mode: &i32| mode.to_be_bytes()));
@@ -322,18 +303,18 @@ mod tests {
             (String::new(), "it answers 12 outputs with 1 types"),
         ];
         for (types, why) in cases {
-            assert_eq!(Recipe::read(&Output::ALL, &answer(&types)), Err(Refusal::Final(why.into())));
+            assert_eq!(Recipe::read(&Output::all(), &answer(&types)), Err(Refusal::Final(why.into())));
         }
         let old = ALL_TYPES.replacen("VECTOR6D,DOUBLE", "NOT_FOUND,NOT_FOUND", 1);
         let without = Refusal::Without(vec![Output::TcpOffset, Output::Payload]);
-        assert_eq!(Recipe::read(&Output::ALL, &answer(&old)), Err(without));
+        assert_eq!(Recipe::read(&Output::all(), &answer(&old)), Err(without));
     }
 
     proptest! {
         #[test]
         fn no_bytes_make_it_panic(types in prop::collection::vec(any::<u8>(), 0..200), sample in prop::collection::vec(any::<u8>(), 0..400)) {
-            let _ = Recipe::read(&Output::ALL, &types);
-            let recipe = Recipe::read(&Output::ALL, &answer(ALL_TYPES)).unwrap();
+            let _ = Recipe::read(&Output::all(), &types);
+            let recipe = Recipe::read(&Output::all(), &answer(ALL_TYPES)).unwrap();
             let _ = recipe.state(&sample);
             let whole: Vec<u8> = std::iter::once(1).chain(sample.iter().copied().cycle().take(if sample.is_empty() { 0 } else { recipe.size })).collect();
             let _ = recipe.state(&whole);

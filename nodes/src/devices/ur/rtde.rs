@@ -68,7 +68,7 @@ impl Stream {
     /// # Errors
     /// Why there is no stream, and whether another attempt can succeed.
     pub(super) async fn open(request: &Request) -> Result<Self, Failure> {
-        let mut outputs = Output::ALL.to_vec();
+        let mut outputs = Output::all().to_vec();
         loop {
             // A controller that refuses outputs is asked on a new connection.
             match Self::start(request, &outputs).await {

@@ -33,15 +33,6 @@ const STRANGERS: &str = "connections that were not expected";
 /// Longest time in which the velocity may have changed between two messages [s].
 const MAX_STEP_S: f64 = 0.1;
 
-/// How a session ends.
-#[derive(Debug)]
-pub(super) enum End {
-    /// The run is over.
-    Run,
-    /// The connection is lost, for this reason.
-    Lost(String),
-}
-
 /// One connection to the robot.
 pub(super) struct Session<'a> {
     robot: &'a Robot,
@@ -108,8 +99,11 @@ impl<'a> Session<'a> {
         }
     }
 
-    /// Publishes samples and sends velocities until the run or the connection ends.
-    pub(super) async fn follow(&mut self, link: &mut Link) -> End {
+    /// Publishes samples and sends velocities until the run ends.
+    ///
+    /// # Errors
+    /// Why the connection is lost before.
+    pub(super) async fn follow(&mut self, link: &mut Link) -> Result<(), String> {
         let silence = self.robot.silence;
         loop {
             let stopped = link.stopped();
@@ -117,13 +111,11 @@ impl<'a> Session<'a> {
                 biased;
                 () = stopped, if self.ending.is_none() => self.ending = Some(Instant::now()),
                 ready = self.stream.readable() => {
-                    let cycle = ready.map_err(|error| error.to_string()).and_then(|()| self.cycle(link));
-                    if let Err(why) = cycle {
-                        return End::Lost(why);
-                    }
+                    ready.map_err(|error| error.to_string())?;
+                    self.cycle(link)?;
                     // What has arrived may contain no sample.
                     if self.heard.elapsed() > silence {
-                        return End::Lost(format!("no sample for {silence:?}"));
+                        return Err(format!("no sample for {silence:?}"));
                     }
                 }
                 accepted = self.listeners.accept() => self.accept(link, accepted),
@@ -131,13 +123,13 @@ impl<'a> Session<'a> {
                 () = sleep_until((self.heard + silence).into()) => {
                     // A process that was suspended sees its time run out before it sees what has arrived.
                     if timeout(ARRIVED, self.stream.readable()).await.is_err() {
-                        return End::Lost(format!("no sample for {silence:?}"));
+                        return Err(format!("no sample for {silence:?}"));
                     }
                 }
             }
             if self.ends() {
                 self.leave(link.is_mute()).await;
-                return End::Run;
+                return Ok(());
             }
         }
     }

@@ -45,6 +45,6 @@ impl Pads {
 /// Returns the corners of a pad in its own frame [m].
 #[must_use]
 pub fn corners(shape: &ImageShape) -> [Vector3<f64>; 4] {
-    let [x, y] = [shape.cols as f64 * shape.pitch[0] / 2.0, shape.rows as f64 * shape.pitch[1] / 2.0];
+    let [x, y] = shape.half();
     [[x, y], [x, -y], [-x, y], [-x, -y]].map(|[x, y]| Vector3::new(x, y, 0.0))
 }

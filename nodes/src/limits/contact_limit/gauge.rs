@@ -24,8 +24,6 @@ pub(in crate::limits) struct Gauge {
     /// Of a single tactel.
     peak: Ceiling,
     shape: ImageShape,
-    /// Half of the width and of the height of the pad [m].
-    half: [f64; 2],
     /// Time between two ticks [s].
     period: f64,
     /// Maximum age of the image [ns].
@@ -76,7 +74,6 @@ impl Gauge {
         warnings: &mut Mistakes,
     ) -> Result<Self, Mistakes> {
         let ceilings = Ceilings::new(params, shape.unit, warnings)?;
-        let half = [shape.cols as f64 * shape.pitch[0] / 2.0, shape.rows as f64 * shape.pitch[1] / 2.0];
         // An image that is not sampled in each tick is older by a period at most.
         let delay = 2.0 * period + (sample_period - period).max(0.0);
         let [force, peak] = stiffnesses(params, shape, &ceilings, delay);
@@ -91,7 +88,7 @@ impl Gauge {
         let max_age = max_age(params.max_age_ms, sample_period);
         let threshold = params.threshold.unwrap_or(DEFAULT_THRESHOLD * peak.load);
         let joints = params.joint_n_m_per_rad.filter(|_| shape.unit == Unit::NEWTON).map(f64::recip);
-        Ok(Self { force, peak, shape: shape.clone(), half, period, max_age, threshold, joints })
+        Ok(Self { force, peak, shape: shape.clone(), period, max_age, threshold, joints })
     }
 
     /// Whether the image has raw readings, so that nothing is limited in newtons.
@@ -100,8 +97,8 @@ impl Gauge {
     }
 
     /// Returns half of the width and of the height of the pad [m].
-    pub(in crate::limits) const fn half(&self) -> [f64; 2] {
-        self.half
+    pub(in crate::limits) fn half(&self) -> [f64; 2] {
+        self.shape.half()
     }
 
     /// Returns whether a sample is young enough at the time `now` [ns].

@@ -14,6 +14,7 @@ use tactflow_runtime::node::{Describe, In, Inputs, Limits, Mistakes, Node, Out, 
 use tactflow_runtime::signal::{Image, Jacobian, Pose, Scalar, Twist};
 
 use super::fraction;
+use super::lost_contact::approach;
 use crate::motion::bounds::countable;
 use crate::usual::{USUAL_FORCE_N, USUAL_M_PER_S, USUAL_PEAK_N};
 
@@ -122,18 +123,18 @@ pub struct Inputs<'a> {
     jacobian: Option<In<'a, Jacobian>>,
 }
 
-/// What `contact_limit` writes.
+/// What `contact_limit` and `second_contact_limit` write.
 #[derive(Outputs)]
 pub struct Outputs {
-    /// The same motion with a limited approach.
+    /// The same motion with a limited approach of the pad.
     #[port(frame = "A")]
-    twist: Out<Twist>,
+    pub(in crate::limits) twist: Out<Twist>,
     /// Fraction of the approach that passes under the ceiling of the sum.
     #[port(unit = "1", frame = "_")]
-    force: Out<Scalar>,
+    pub(in crate::limits) force: Out<Scalar>,
     /// Fraction of the approach that passes under the ceiling of a tactel.
     #[port(unit = "1", frame = "_")]
-    peak: Out<Scalar>,
+    pub(in crate::limits) peak: Out<Scalar>,
 }
 
 impl Node for ContactLimit {
@@ -142,7 +143,7 @@ impl Node for ContactLimit {
     type Outputs = Outputs;
     type State = Reading;
 
-    // The image and its age move on while a motion is held.
+    // The image and its age move on while a motion is held, and the poses of two pads.
     const LIMITS: Limits = Limits {
         through: Some("twist"),
         holds: &["force", "peak"],
@@ -183,8 +184,7 @@ impl Node for ContactLimit {
 /// object presses on the pad [m], and the approach at that point is limited. If it returns `None`, the whole motion is
 /// scaled until no corner is too fast.
 pub fn bar(twist: &mut Twist, half: [f64; 2], allowed: f64, point: impl FnOnce() -> Option<[f64; 2]>) -> f64 {
-    let [_, _, vz, wx, wy, _] = twist.0.into();
-    let fastest = vz + wx.abs() * half[1] + wy.abs() * half[0];
+    let fastest = approach(twist, half);
     if fastest <= allowed {
         return 1.0;
     }
@@ -192,6 +192,7 @@ pub fn bar(twist: &mut Twist, half: [f64; 2], allowed: f64, point: impl FnOnce()
         twist.0 *= allowed / fastest;
         return allowed / fastest;
     };
+    let [_, _, vz, wx, wy, _] = twist.0.into();
     let speed = vz + wx * y - wy * x;
     if speed <= allowed {
         return 1.0;

@@ -5,7 +5,9 @@ mod course;
 mod lead;
 
 use tactflow_runtime::node::{Describe, In, Inputs, Limits, Mistakes, Node, Out, Outputs, Param, Setup, State, Tick};
-use tactflow_runtime::signal::{Flag, Image, Jacobian, Joints, Pose, Scalar, ScalarShape, Stamp, Twist, Unit};
+use tactflow_runtime::signal::{
+    Flag, Image, ImageShape, Jacobian, Joints, Pose, Scalar, ScalarShape, Stamp, Twist, Unit,
+};
 
 use super::max_age;
 use crate::motion::bounds::countable;
@@ -137,9 +139,7 @@ impl Node for LostContact {
     };
 
     fn new(params: Params, setup: &mut Setup<Self>) -> Result<Self, Mistakes> {
-        let half = setup.inputs.image.as_ref().map_or([0.0; 2], |image| {
-            [image.cols as f64 * image.pitch[0] / 2.0, image.rows as f64 * image.pitch[1] / 2.0]
-        });
+        let half = setup.inputs.image.as_ref().map_or([0.0; 2], ImageShape::half);
         setup.outputs.lead = ScalarShape::of(Unit::METRE);
         let max_ages = ["contact", "image", "pose"].map(|input| max_age(params.max_age_ms, setup.sample_period(input)));
         let [debounce, wait] = [params.debounce_ms, params.wait_ms].map(|ms| (ms * 1e6) as i64);
@@ -191,7 +191,6 @@ pub struct Manner {
 }
 
 /// Returns what a phase leaves of the wanted motion.
-#[must_use]
 pub fn allowed(wanted: &Twist, phase: Phase, manner: &Manner) -> Twist {
     match phase {
         Phase::Free | Phase::Touched => *wanted,
@@ -215,7 +214,6 @@ pub fn approach(twist: &Twist, half: [f64; 2]) -> f64 {
 }
 
 /// Returns the motion without its part into the object: no corner of the pad moves into it.
-#[must_use]
 pub fn kept_out(twist: &Twist, half: [f64; 2]) -> Twist {
     let mut twist = *twist;
     twist.0[2] -= approach(&twist, half).max(0.0);
@@ -223,7 +221,6 @@ pub fn kept_out(twist: &Twist, half: [f64; 2]) -> Twist {
 }
 
 /// Returns the motion, scaled so that no corner of the pad is faster than `speed` [m/s] if one moves into the object.
-#[must_use]
 pub fn slowed_down(twist: &Twist, half: [f64; 2], speed: f64) -> Twist {
     if approach(twist, half) <= 0.0 {
         return *twist;

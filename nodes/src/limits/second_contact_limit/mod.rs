@@ -10,10 +10,10 @@
 //! decision 024.
 
 use nalgebra::{IsometryMatrix3, Vector3};
-use tactflow_runtime::node::{Describe, In, Inputs, Limits, Mistakes, Node, Out, Outputs, Setup, Tick};
-use tactflow_runtime::signal::{Image, Jacobian, Pose, Scalar, Twist};
+use tactflow_runtime::node::{Describe, In, Inputs, Limits, Mistakes, Node, Setup, Tick};
+use tactflow_runtime::signal::{Image, Jacobian, Pose, Twist};
 
-use super::contact_limit::{Gauge, Params, Reading};
+use super::contact_limit::{ContactLimit, Gauge, Outputs, Params, Reading};
 use super::fraction;
 use crate::motion::bounds::countable;
 
@@ -80,34 +80,13 @@ pub struct Inputs<'a> {
     jacobian: Option<In<'a, Jacobian>>,
 }
 
-/// What `second_contact_limit` writes.
-#[derive(Outputs)]
-pub struct Outputs {
-    /// The same motion with a limited approach of the second pad.
-    #[port(frame = "A")]
-    twist: Out<Twist>,
-    /// Fraction of the approach that passes under the ceiling of the sum.
-    #[port(unit = "1", frame = "_")]
-    force: Out<Scalar>,
-    /// Fraction of the approach that passes under the ceiling of a tactel.
-    #[port(unit = "1", frame = "_")]
-    peak: Out<Scalar>,
-}
-
 impl Node for SecondContactLimit {
     type Params = Params;
     type Inputs<'a> = Inputs<'a>;
     type Outputs = Outputs;
     type State = Reading;
 
-    // The image, the poses and their ages move on while a motion is held.
-    const LIMITS: Limits = Limits {
-        through: Some("twist"),
-        holds: &["force", "peak"],
-        breaks: &["workspace", "blind", "speed", "acceleration"],
-        guards: Some("image"),
-        ..Limits::NONE
-    };
+    const LIMITS: Limits = ContactLimit::LIMITS;
 
     fn new(params: Params, setup: &mut Setup<Self>) -> Result<Self, Mistakes> {
         let periods = [setup.period, setup.sample_period("image")];

@@ -6,10 +6,11 @@ mod points;
 mod trace;
 
 use nalgebra::{IsometryMatrix3, Vector3};
-use tactflow_runtime::node::{Absence, Describe, FilePath, In, Inputs, Interval, Mistakes, Motion};
+use tactflow_runtime::node::{Absence, Describe, FilePath, Interval, Mistakes, Motion};
 use tactflow_runtime::node::{Node, Out, Outputs, Param, Setup, State, Tick};
-use tactflow_runtime::signal::{Flag, Pose, Scalar, Twist};
+use tactflow_runtime::signal::{Flag, Scalar, Twist};
 
+use super::hold_pose::Inputs;
 use super::placement::Placement;
 use crate::usual::{USUAL_LENGTH_M, USUAL_M_PER_S, USUAL_M_PER_S2, USUAL_REACH_M};
 use path::Profile;
@@ -115,17 +116,6 @@ enum Reference {
     Base,
     /// The frame of the sensor when the run begins.
     Start,
-}
-
-/// What `follow_path` reads.
-#[derive(Inputs)]
-pub struct Inputs<'a> {
-    /// Pose of the sensor in the base.
-    #[port(frame = "A", reference = "B", quantity = "sensor_pose")]
-    pose: In<'a, Pose>,
-    /// The run continues while this is present and set. Without this wire it always continues.
-    #[port(optional)]
-    gate: Option<In<'a, Flag>>,
 }
 
 /// What `follow_path` writes.

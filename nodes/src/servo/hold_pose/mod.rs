@@ -75,15 +75,15 @@ pub struct Params {
     within_rad: f64,
 }
 
-/// What `hold_pose` reads.
+/// What a motion along measured poses reads.
 #[derive(Inputs)]
 pub struct Inputs<'a> {
     /// Pose of the sensor in the base.
     #[port(frame = "A", reference = "B", quantity = "sensor_pose")]
-    pose: In<'a, Pose>,
+    pub(super) pose: In<'a, Pose>,
     /// The motion continues while this is present and set. Without this wire it always continues.
     #[port(optional)]
-    gate: Option<In<'a, Flag>>,
+    pub(super) gate: Option<In<'a, Flag>>,
 }
 
 /// What `hold_pose` writes.

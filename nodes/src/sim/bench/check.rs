@@ -3,16 +3,15 @@
 use tactflow_runtime::node::{Mistake, Mistakes, refuse_any};
 
 use super::Params;
-use crate::sim::arm_model::ArmModel;
 use crate::sim::object::MOUNT_DAMPING;
-use crate::sim::pad_model::PadModel;
 use crate::sim::steps::{check_step, is_resolved};
 
-/// Checks that a bench with this pad, and with an arm of so many joints, can be simulated.
+/// Checks that a bench with an arm of so many joints can be simulated.
 ///
 /// # Errors
 /// All parameters that are outside of what the simulation supports.
-pub(super) fn check(params: &Params, pad: &PadModel, arm: &ArmModel, joints: usize) -> Result<(), Mistakes> {
+pub(super) fn check(params: &Params, joints: usize) -> Result<(), Mistakes> {
+    let Params { pad, arm, .. } = params;
     refuse_any(pad.check().into_iter().chain(check_step(params.step_s)).chain(arm.check_inertia(joints)))?;
     refuse_any(check_mounts(params).into_iter().chain(arm.check_motion(params.step_s)))
 }

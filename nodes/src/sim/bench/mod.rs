@@ -9,23 +9,20 @@ mod check;
 use std::borrow::Cow;
 
 use tactflow_runtime::device::{Commands, Description, Device, DeviceError, Driver, Opened, Output, Samples, Stepped};
-use tactflow_runtime::node::{Describe, FilePath, Mistakes, Param, PortSpec};
+use tactflow_runtime::node::{Describe, Mistakes, Param, PortSpec};
 use tactflow_runtime::signal::{Image, ImageShape, Joint, Kind, Pose, Scalar, ScalarShape, Unit};
 
 use super::arm_model::ArmModel;
-use super::foam::Foam;
 use super::frames::{Beats, Frames};
 use super::joints::SimArm;
 use super::object::{Object, ObjectParams};
 use super::pad_model::PadModel;
-use super::readout::{Electronics, Readout};
+use super::readout::Readout;
 use super::shape::pose3;
 use super::world::World;
-use crate::arm::mount::Mount;
 use crate::devices::arm::{self, ArmPorts};
 use crate::devices::{nanos, pad, period_of};
 use crate::roles::ground_truth;
-use crate::usual::{USUAL_PRESSURE_N, USUAL_THRESHOLD_N};
 use tactflow_runtime::random::Random;
 
 /// Parameters of `sim_bench`.
@@ -40,66 +37,12 @@ pub struct Params {
     /// Objects to touch.
     #[param(default = vec![])]
     objects: Vec<ObjectParams>,
-    /// Number of rows of the pad.
-    #[param(range = 1..=1_000_000, default = 16)]
-    rows: usize,
-    /// Number of columns of the pad.
-    #[param(range = 1..=1_000_000, default = 16)]
-    cols: usize,
-    /// Distance between the centres of neighbouring tactels, along x and along y.
-    #[param(unit = "m", above = 0.0, default = 0.005)]
-    pitch: f64,
-    /// Frames per second.
-    #[param(unit = "1/s", range = 0.001..=1e6, default = 250.0)]
-    rate_hz: f64,
-    /// Time from taking an image until it is available.
-    #[param(unit = "s", range = 0.0.., default = 0.004)]
-    latency_s: f64,
-    /// Calibration file of the pad, stated as a fact for `calibrate`.
-    calibration: Option<FilePath>,
-    /// Noise threshold that the pad states as a fact.
-    #[param(unit = "N", range = 0.0.., usual = ..=USUAL_THRESHOLD_N, default = 0.015)]
-    threshold: f64,
-    /// Unit of pressure that the pad states as a fact: p = 1 in the paper.
-    #[param(unit = "N/tactel", above = 0.0, usual = ..=USUAL_PRESSURE_N, default = 0.1)]
-    pressure: f64,
-    /// Properties of the foam.
-    #[param(default = Foam::DEFAULT)]
-    foam: Foam,
-    /// Largest distance between simulated points of the pad; a thin probe needs a smaller one than a ball.
-    #[param(unit = "m", above = 0.0, default = 0.001)]
-    points_apart: f64,
-    /// Properties of the electronics.
-    #[param(default = Electronics::DEFAULT)]
-    electronics: Electronics,
-    /// Model of the arm.
-    urdf: FilePath,
-    /// Link that carries the sensor.
-    tip: String,
-    /// Pose of the sensor on that link.
-    #[param(default = Mount::NONE)]
-    mount: Mount,
-    /// Posture that the arm prefers, stated as a fact; in m for a prismatic joint.
-    #[param(unit = "rad")]
-    home: Option<Vec<f64>>,
-    /// Joint positions at the start, one per joint; `home` if not given.
-    #[param(unit = "rad")]
-    start: Option<Vec<f64>>,
-    /// Stiffness of the joints.
-    #[param(unit = "N m/rad", above = 0.0, default = 200.0)]
-    stiffness: f64,
-    /// Damping of the joints as a fraction of the critical one.
-    #[param(unit = "1", range = 0.0.., default = 0.2)]
-    damping_ratio: f64,
-    /// Inertia of each joint; that of the seven joints of an LWR if not given.
-    #[param(unit = "kg m2")]
-    inertia: Option<Vec<f64>>,
-    /// Dry friction of the joints.
-    #[param(unit = "N m", range = 0.0.., default = 0.1)]
-    friction: f64,
-    /// Largest acceleration that the arm states for each joint.
-    #[param(unit = "rad/s2", above = 0.0, default = 10.0)]
-    acceleration: f64,
+    /// The pad.
+    #[param(flatten)]
+    pad: PadModel,
+    /// The arm.
+    #[param(flatten)]
+    arm: ArmModel,
     /// Longest step of the simulation.
     #[param(unit = "s", above = 0.0, default = 0.002)]
     step_s: f64,
@@ -196,63 +139,32 @@ impl Device for SimBench {
     type Params = Params;
 
     fn open(params: Params) -> Result<Opened, Mistakes> {
-        let (pad, model) = (params.pad(), params.arm());
-        let arm = model.load()?;
-        check::check(&params, &pad, &model, arm.joints.joints.len())?;
-        let (period, latency) = (period_of(params.rate_hz), nanos(params.latency_s));
+        let Params { pad, arm: model, .. } = &params;
+        let (arm, shape) = (model.load()?, pad.shape());
+        check::check(&params, arm.joints.joints.len())?;
+        let (period, latency) = (period_of(pad.rate_hz), nanos(pad.latency_s));
         let mut description = Description::every(period as f64 * 1e-9);
-        let image = pad::fill(&mut description, pad.shape.clone(), pad.facts(&params.mount)?);
+        let image = pad::fill(description.fills(pad::ROLE), shape.clone(), pad.facts(&model.body.mount)?);
         let joints = arm.joints.joints.clone();
-        let ports = ArmPorts::fill(&mut description, &arm.joints, model.facts(&arm)?);
-        let tactels = pad.shape.tactels();
+        let ports = ArmPorts::fill(description.fills(arm::ROLE), &arm.joints, model.facts(&arm)?);
+        let tactels = pad.tactels();
         let readout = Readout::new(tactels, pad.electronics.clone(), params.seed);
         let bench = Self {
             arm: ports,
-            truth: TruthPorts::fill(&mut description, &pad.shape),
+            truth: TruthPorts::fill(&mut description, &shape),
             frames: Frames::new(image, readout, tactels, [period, latency]),
             joints,
             beats: Beats::new(period, params.for_s.map_or(i64::MAX, nanos)),
             sequence: 0,
-            threshold: params.threshold,
-            world: world(params, model.arm(arm), pad.shape)?,
+            threshold: pad.threshold,
+            world: world(&params, model.arm(arm), shape)?,
         };
         Ok(Opened { description, driver: Driver::Stepped(Box::new(bench)) })
     }
 }
 
-impl Params {
-    fn pad(&self) -> PadModel {
-        PadModel {
-            shape: PadModel::shape(self.rows, self.cols, self.pitch),
-            points_apart: self.points_apart,
-            rate_hz: self.rate_hz,
-            latency_s: self.latency_s,
-            foam: self.foam.clone(),
-            electronics: self.electronics.clone(),
-            calibration: self.calibration.clone(),
-            threshold: self.threshold,
-            pressure: self.pressure,
-        }
-    }
-
-    fn arm(&self) -> ArmModel {
-        ArmModel {
-            urdf: self.urdf.clone(),
-            tip: self.tip.clone(),
-            mount: self.mount.clone(),
-            home: self.home.clone(),
-            start: self.start.clone(),
-            stiffness: self.stiffness,
-            damping_ratio: self.damping_ratio,
-            inertia: self.inertia.clone(),
-            friction: self.friction,
-            acceleration: self.acceleration,
-        }
-    }
-}
-
 /// Returns the world with its objects, which are placed relative to the sensor.
-fn world(params: Params, arm: SimArm, shape: ImageShape) -> Result<World, Mistakes> {
+fn world(params: &Params, arm: SimArm, shape: ImageShape) -> Result<World, Mistakes> {
     let from = arm.motion().pose;
     let mut scatter = Random::new(params.seed, 3);
     let place = |(i, object): (usize, &ObjectParams)| {
@@ -260,7 +172,7 @@ fn world(params: Params, arm: SimArm, shape: ImageShape) -> Result<World, Mistak
         Object::new(object, from, offset).map_err(|message| check::object(i, message))
     };
     let objects = params.objects.iter().enumerate().map(place).collect::<Result<Vec<_>, _>>()?;
-    Ok(World::new(arm, objects, shape, params.foam, params.points_apart, params.step_s))
+    Ok(World::new(arm, objects, shape, params.pad.foam.clone(), params.pad.points_apart, params.step_s))
 }
 
 impl SimBench {

@@ -22,18 +22,16 @@ use self::side::SideParams;
 use self::table::Table;
 use self::truth::ObjectPorts;
 use self::world::{ArmAndPad, PairWorld};
-use super::arm_model::{ArmModel, LoadedArm};
-use super::foam::Foam;
+use super::arm_model::{ArmBody, ArmModel, LoadedArm};
 use super::frames::{Beats, Frames};
 use super::joints::SimArm;
 use super::pad_model::PadModel;
-use super::readout::{Electronics, Readout};
+use super::readout::Readout;
 use super::shape::pose3;
 use super::steps::check_step;
-use crate::arm::mount::Mount;
 use crate::devices::arm::{self, ArmPorts};
 use crate::devices::{nanos, pad, period_of};
-use crate::usual::{USUAL_PRESSURE_N, USUAL_REACH_M, USUAL_THRESHOLD_N};
+use crate::usual::USUAL_REACH_M;
 use tactflow_runtime::random::Random;
 
 /// Parameters of `sim_pair`.
@@ -57,66 +55,16 @@ pub struct Params {
     left: SideParams,
     /// The arm and the pad of the side `right`.
     right: SideParams,
-    /// Number of rows of each pad.
-    #[param(range = 1..=1_000_000, default = 16)]
-    rows: usize,
-    /// Number of columns of each pad.
-    #[param(range = 1..=1_000_000, default = 16)]
-    cols: usize,
-    /// Distance between the centres of neighbouring tactels, along x and along y.
-    #[param(unit = "m", above = 0.0, default = 0.005)]
-    pitch: f64,
-    /// Frames per second.
-    #[param(unit = "1/s", range = 0.001..=1e6, default = 250.0)]
-    rate_hz: f64,
-    /// Time from taking an image until it is available.
-    #[param(unit = "s", range = 0.0.., default = 0.004)]
-    latency_s: f64,
-    /// Calibration file of the pads, stated as a fact for `calibrate`.
-    calibration: Option<FilePath>,
-    /// Noise threshold that the pads state as a fact.
-    #[param(unit = "N", range = 0.0.., usual = ..=USUAL_THRESHOLD_N, default = 0.015)]
-    threshold: f64,
-    /// Unit of pressure that the pads state as a fact.
-    #[param(unit = "N/tactel", above = 0.0, usual = ..=USUAL_PRESSURE_N, default = 0.1)]
-    pressure: f64,
-    /// Properties of the foam, with its friction on the object.
-    #[param(default = Foam::DEFAULT)]
-    foam: Foam,
-    /// Largest distance between simulated points of a pad.
-    #[param(unit = "m", above = 0.0, default = 0.001)]
-    points_apart: f64,
-    /// Properties of the electronics of both pads.
-    #[param(default = Electronics::DEFAULT)]
-    electronics: Electronics,
+    /// Both pads.
+    #[param(flatten)]
+    pad: PadModel,
     /// Model of both arms.
     urdf: Option<FilePath>,
     /// Link that carries the sensor.
     tip: Option<String>,
-    /// Pose of the sensor on that link.
-    #[param(default = Mount::NONE)]
-    mount: Mount,
-    /// Posture that the arms prefer, stated as a fact; in m for a prismatic joint.
-    #[param(unit = "rad")]
-    home: Option<Vec<f64>>,
-    /// Joint positions at the start, one per joint; `home` if not given.
-    #[param(unit = "rad")]
-    start: Option<Vec<f64>>,
-    /// Stiffness of the joints.
-    #[param(unit = "N m/rad", above = 0.0, default = 200.0)]
-    stiffness: f64,
-    /// Damping of the joints as a fraction of the critical one.
-    #[param(unit = "1", range = 0.0.., default = 0.2)]
-    damping_ratio: f64,
-    /// Inertia of each joint; that of the seven joints of an LWR if not given.
-    #[param(unit = "kg m2")]
-    inertia: Option<Vec<f64>>,
-    /// Dry friction of the joints.
-    #[param(unit = "N m", range = 0.0.., default = 0.1)]
-    friction: f64,
-    /// Largest acceleration that the arms state for each joint.
-    #[param(unit = "rad/s2", above = 0.0, default = 10.0)]
-    acceleration: f64,
+    /// Both arms, beside their models.
+    #[param(flatten)]
+    arm: ArmBody,
     /// Longest step of the simulation; a light object makes the steps shorter.
     #[param(unit = "s", above = 0.0, default = 0.002)]
     step_s: f64,
@@ -199,24 +147,22 @@ impl Device for SimPair {
     type Params = Params;
 
     fn open(params: Params) -> Result<Opened, Mistakes> {
-        let pad = params.pad();
+        let pad = &params.pad;
         refuse_any(pad.check().into_iter().chain(check_step(params.step_s)))?;
         let [left, right] = [params.load(0)?, params.load(1)?];
-        let max_step =
-            params.object.step(&params.foam, pad.shape.tactels() as f64 * params.pitch.powi(2), params.step_s)?;
+        let max_step = params.object.step(&pad.foam, pad.area(), params.step_s)?;
         let mut scatter = Random::new(params.seed, 3);
         let offset = [0, 1].map(|_| scatter.uniform(-params.object.scatter, params.object.scatter));
         let body = params.object.body(params.table_height, offset)?;
         let table = Table::new(params.table_height, params.table_friction, &body);
-        let period = period_of(params.rate_hz);
+        let period = period_of(pad.rate_hz);
         let mut description = Description::every(period as f64 * 1e-9);
         let noise = [2, 4].map(|stream| Random::new(params.seed, stream));
         let [left_noise, right_noise] = noise;
-        let (left, left_arm) = params.side(&mut description, &pad, NAMES[0], left, left_noise)?;
-        let (right, right_arm) = params.side(&mut description, &pad, NAMES[1], right, right_noise)?;
+        let (left, left_arm) = params.side(&mut description, NAMES[0], left, left_noise)?;
+        let (right, right_arm) = params.side(&mut description, NAMES[1], right, right_noise)?;
         let on_base = |side: &SideParams, arm: SimArm| {
-            let foam = params.foam.clone();
-            ArmAndPad::new(pose3(&Pose(side.base.pose())), arm, &pad.shape, foam, params.points_apart)
+            ArmAndPad::new(pose3(&Pose(side.base.pose())), arm, &pad.shape(), pad.foam.clone(), pad.points_apart)
         };
         let arms = [on_base(&params.left, left_arm), on_base(&params.right, right_arm)];
         let cell = Self {
@@ -231,20 +177,6 @@ impl Device for SimPair {
 }
 
 impl Params {
-    fn pad(&self) -> PadModel {
-        PadModel {
-            shape: PadModel::shape(self.rows, self.cols, self.pitch),
-            points_apart: self.points_apart,
-            rate_hz: self.rate_hz,
-            latency_s: self.latency_s,
-            foam: self.foam.clone(),
-            electronics: self.electronics.clone(),
-            calibration: self.calibration.clone(),
-            threshold: self.threshold,
-            pressure: self.pressure,
-        }
-    }
-
     /// Reads and checks the model of the left (0) or the right arm (1).
     fn load(&self, side: usize) -> Result<(ArmModel, LoadedArm), Mistakes> {
         let (own, name) = ([&self.left, &self.right][side], NAMES[side]);
@@ -260,15 +192,15 @@ impl Params {
     fn side(
         &self,
         description: &mut Description,
-        pad: &PadModel,
         name: &'static str,
         (model, loaded): (ArmModel, LoadedArm),
         noise: Random,
     ) -> Result<(Side, SimArm), Mistakes> {
-        let times = [period_of(self.rate_hz), nanos(self.latency_s)];
-        let image = pad::fill_on(description, name, pad.shape.clone(), pad.facts(&model.mount)?);
-        let arm = ArmPorts::fill_on(description, name, &loaded.joints, model.facts(&loaded)?);
-        let tactels = pad.shape.tactels();
+        let pad = &self.pad;
+        let times = [period_of(pad.rate_hz), nanos(pad.latency_s)];
+        let image = pad::fill(description.fills_on(name, pad::ROLE), pad.shape(), pad.facts(&model.body.mount)?);
+        let arm = ArmPorts::fill(description.fills_on(name, arm::ROLE), &loaded.joints, model.facts(&loaded)?);
+        let tactels = pad.tactels();
         let readout = Readout::new(tactels, pad.electronics.clone(), self.seed).with_noise(noise);
         let joints = loaded.joints.joints.clone();
         Ok((Side { arm, joints, frames: Frames::new(image, readout, tactels, times) }, model.arm(loaded)))

@@ -7,7 +7,7 @@ use tactflow_runtime::source::Code;
 use super::Params;
 use crate::arm::mount::Mount;
 use crate::motion::pose::pose_of;
-use crate::sim::arm_model::ArmModel;
+use crate::sim::arm_model::{ArmBody, ArmModel};
 use crate::usual::{USUAL_RAD, USUAL_REACH_M};
 
 /// Parameters of one arm. A parameter that is not given is that of the device, which both arms share.
@@ -76,14 +76,16 @@ impl SideParams {
         Ok(ArmModel {
             urdf: self.urdf.as_ref().or(shared.urdf.as_ref()).cloned().ok_or_else(|| missing("urdf"))?,
             tip: self.tip.as_ref().or(shared.tip.as_ref()).cloned().ok_or_else(|| missing("tip"))?,
-            mount: self.mount.as_ref().unwrap_or(&shared.mount).clone(),
-            home: self.home.as_ref().or(shared.home.as_ref()).cloned(),
-            start: self.start.as_ref().or(shared.start.as_ref()).cloned(),
-            stiffness: self.stiffness.unwrap_or(shared.stiffness),
-            damping_ratio: self.damping_ratio.unwrap_or(shared.damping_ratio),
-            inertia: self.inertia.as_ref().or(shared.inertia.as_ref()).cloned(),
-            friction: self.friction.unwrap_or(shared.friction),
-            acceleration: self.acceleration.unwrap_or(shared.acceleration),
+            body: ArmBody {
+                mount: self.mount.as_ref().unwrap_or(&shared.arm.mount).clone(),
+                home: self.home.as_ref().or(shared.arm.home.as_ref()).cloned(),
+                start: self.start.as_ref().or(shared.arm.start.as_ref()).cloned(),
+                stiffness: self.stiffness.unwrap_or(shared.arm.stiffness),
+                damping_ratio: self.damping_ratio.unwrap_or(shared.arm.damping_ratio),
+                inertia: self.inertia.as_ref().or(shared.arm.inertia.as_ref()).cloned(),
+                friction: self.friction.unwrap_or(shared.arm.friction),
+                acceleration: self.acceleration.unwrap_or(shared.arm.acceleration),
+            },
         })
     }
 
@@ -101,16 +103,6 @@ impl SideParams {
 
     /// Returns whether the arm itself gives a parameter.
     fn has(&self, name: &str) -> bool {
-        match name {
-            "urdf" => self.urdf.is_some(),
-            "tip" => self.tip.is_some(),
-            "home" => self.home.is_some(),
-            "start" => self.start.is_some(),
-            "stiffness" => self.stiffness.is_some(),
-            "damping_ratio" => self.damping_ratio.is_some(),
-            "inertia" => self.inertia.is_some(),
-            "friction" => self.friction.is_some(),
-            _ => false,
-        }
+        self.written().is_some_and(|own| own.get(name).is_some())
     }
 }

@@ -43,7 +43,7 @@ fn ball_of(mass: f64, radius: f64) -> CarriedParams {
 
 /// Returns foam whose friction is `mu` at rest and sliding.
 fn foam(mu: f64) -> Foam {
-    Foam { static_friction: mu, sliding_friction: mu, ..Foam::DEFAULT }
+    Foam { static_friction: mu, sliding_friction: mu, ..Foam::default() }
 }
 
 /// Returns an arm with a joint along the pad's y, which is up, and one along its z, towards the object.

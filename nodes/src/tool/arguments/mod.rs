@@ -27,3 +27,8 @@ pub(super) fn may_replace(path: &Path, what: &str, is_one: impl Fn(&str) -> bool
         Err(error) => Err(format!("cannot write `{}`: {error}", path.display())),
     }
 }
+
+/// Writes a file.
+pub(super) fn write(path: &Path, text: &str) -> Result<(), String> {
+    std::fs::write(path, text).map_err(|error| format!("cannot write `{}`: {error}", path.display()))
+}

@@ -42,7 +42,7 @@ enum Guided {
     Mount(mount::MountArgs),
 }
 
-pub(super) fn run(args: CalibrateArgs, shell: &Shell) -> u8 {
+pub(super) fn run(args: CalibrateArgs, shell: &Shell) -> Result<u8, u8> {
     match args.guided {
         None => pad::run(args.pad, shell),
         Some(Guided::Tool(args)) => tool::run(&args, shell),

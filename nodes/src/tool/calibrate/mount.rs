@@ -59,18 +59,12 @@ struct Pad {
     present: Mount,
 }
 
-pub(super) fn run(args: &MountArgs, shell: &Shell) -> u8 {
-    let mut cell = match GuidedCell::open(shell, &args.bench) {
-        Ok(cell) => cell,
-        Err(code) => return code,
-    };
+pub(super) fn run(args: &MountArgs, shell: &Shell) -> Result<u8, u8> {
+    let mut cell = GuidedCell::open(shell, &args.bench)?;
     let found = Pad::find(&cell, args).and_then(|pad| Ok((pad, BenchFile::read(&args.bench)?)));
-    let (pad, mut bench) = match found {
-        Ok(found) => found,
-        Err(message) => return shell.refuse(message),
-    };
+    let (pad, mut bench) = found.map_err(|why| shell.refuse(why))?;
     let done = pad.touch(&mut cell).and_then(|found| pad.conclude(&mut cell, &found, &mut bench));
-    done.unwrap_or_else(|left| left.report(shell))
+    done.map_err(|left| left.report(shell))
 }
 
 impl Pad {

@@ -8,6 +8,10 @@ use crate::calibration::pad_mount::{
     DOUBTFUL_RESIDUAL_M, KeptRotation, MIN_TOUCHES, MountFit, MountPosture, MountUnfit, Outlier,
 };
 use crate::motion::pose::{rotation_vector, rpy_of};
+use crate::tool::guided::vectors::{direction, three};
+
+/// Cosine of the largest angle to the axis that names a direction: about 18° [1].
+const NEAR: f64 = 0.95;
 
 /// Describes a posture that was measured.
 pub(super) fn described(touch: &MountPosture, tactels: usize) -> String {
@@ -35,7 +39,7 @@ pub(super) fn progress(fitted: &Result<MountFit, MountUnfit>, count: usize, wors
         Err(MountUnfit::Alike { axis, deviation }) => format!(
             "the postures are too alike: the place of the pad along {} of the tip is known within {:.0} mm only; tilt the tool by \
              20° or more, each time in another direction",
-            direction(axis),
+            along(axis),
             deviation * 1e3
         ),
     }
@@ -43,14 +47,12 @@ pub(super) fn progress(fitted: &Result<MountFit, MountUnfit>, count: usize, wors
 
 /// Describes the result and its difference from the mount of the bench.
 pub(super) fn report(found: &MountFit, present: &IsometryMatrix3<f64>) -> String {
-    let shift = millimetres(&(found.mount.translation.vector - present.translation.vector));
+    let shift = three(&((found.mount.translation.vector - present.translation.vector) * 1e3), 2);
     let turn = rotation_vector(&(present.rotation.inverse() * found.mount.rotation)).norm().to_degrees();
     let [roll, pitch, yaw] = rpy_of(&found.mount.rotation).map(f64::to_degrees);
+    let at = three(&(found.mount.translation.vector * 1e3), 2);
     let mut lines = vec![
-        format!(
-            "mount: {} mm, roll {roll:.2}°, pitch {pitch:.2}°, yaw {yaw:.2}°",
-            millimetres(&found.mount.translation.vector)
-        ),
+        format!("mount: {at} mm, roll {roll:.2}°, pitch {pitch:.2}°, yaw {yaw:.2}°"),
         residual(found),
         deviations(found),
         format!("difference from the bench: {shift} mm, {turn:.2}°"),
@@ -66,7 +68,7 @@ pub(super) fn report(found: &MountFit, present: &IsometryMatrix3<f64>) -> String
 
 /// Says why a mount is not written whose z points away from that of the bench.
 pub(super) fn facing(present: &IsometryMatrix3<f64>, bench: &Path) -> String {
-    let (bench, z) = (bench.display(), direction_of(&(present.rotation * Vector3::z())));
+    let (bench, z) = (bench.display(), direction(&(present.rotation * Vector3::z()), NEAR));
     format!(
         "z of the measured mount points away from z of the bench, so nothing is written. The contacts do not show which way z \
          points, and one of two is wrong: the image is mirrored, which `tactflow doctor {bench} --press` finds, or z of `mount` \
@@ -82,42 +84,23 @@ fn residual(found: &MountFit) -> String {
 }
 
 fn deviations(found: &MountFit) -> String {
-    let shift = millimetres(&found.shift_deviation);
+    let shift = three(&(found.shift_deviation * 1e3), 2);
     match &found.turn_deviation {
         Ok(turn) => {
-            let turn = turn.map(f64::to_degrees);
-            format!(
-                "standard deviations: {shift} mm along x, y, z of the tip, [{:.2}, {:.2}, {:.2}]° about x, y, z of the pad",
-                turn.x, turn.y, turn.z
-            )
+            let turn = three(&turn.map(f64::to_degrees), 2);
+            format!("standard deviations: {shift} mm along x, y, z of the tip, {turn}° about x, y, z of the pad")
         }
         Err(KeptRotation { axis, .. }) => format!(
             "standard deviations: {shift} mm along x, y, z of the tip; the rotation is that of the bench, because the contacts do \
              not determine it about {} of the pad: touch the point with all corners of the pad",
-            direction(axis)
+            along(axis)
         ),
     }
 }
 
-fn millimetres(vector: &Vector3<f64>) -> String {
-    format!("[{:.2}, {:.2}, {:.2}]", vector.x * 1e3, vector.y * 1e3, vector.z * 1e3)
-}
-
-/// Names a direction: an axis if it is near to one.
-fn direction(axis: &Vector3<f64>) -> String {
-    /// Cosine of the largest angle to the axis that names it: about 18° [1].
-    const NEAR: f64 = 0.95;
-    let named = axis.iter().zip(["x", "y", "z"]).find(|(part, _)| part.abs() > NEAR);
-    named.map_or_else(|| format!("[{:.2}, {:.2}, {:.2}]", axis.x, axis.y, axis.z), |(_, name)| name.to_owned())
-}
-
-/// Names a direction with its sign: an axis if it is near to one.
-fn direction_of(axis: &Vector3<f64>) -> String {
-    let name = direction(&axis.abs());
-    match name.len() {
-        1 => format!("{}{name}", if axis[axis.iamax()] < 0.0 { '-' } else { '+' }),
-        _ => direction(axis),
-    }
+/// Names the axis of a direction that is near to one, without a sign, and else the unit vector.
+fn along(axis: &Vector3<f64>) -> String {
+    direction(axis, NEAR).trim_start_matches(['+', '-']).to_owned()
 }
 
 #[cfg(test)]

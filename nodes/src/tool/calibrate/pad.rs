@@ -13,7 +13,7 @@ use crate::calibration::report::{CalibrationReport, Settings, TactelStatus, cali
 use crate::calibration::samples::LoadKind;
 use crate::calibration::{CurveKind, file, plot};
 use crate::recordings::{self, Assumed, Hints, Refusal};
-use crate::tool::arguments::{may_replace, pair, positive};
+use crate::tool::arguments::{may_replace, pair, positive, write};
 
 /// The arguments of a calibration of the tactels.
 #[derive(Args)]
@@ -59,12 +59,11 @@ const ASSUMED: Assumed = Assumed { unit: Unit::RAW, pitch: [0.005; 2], rate_hz: 
 /// Maximum residual of a calibration that is written, as a fraction of the maximum force.
 const MAX_RESIDUAL: f64 = 0.25;
 
-pub(super) fn run(args: PadArgs, shell: &Shell) -> u8 {
+pub(super) fn run(args: PadArgs, shell: &Shell) -> Result<u8, u8> {
     let refuse = |message: String| shell.refuse(message);
-    let logs =
-        check(&args).map_err(refuse).and_then(|()| args.logs.iter().map(|path| read(path, &args, shell)).collect());
-    let made = logs.and_then(|logs: Vec<Log>| make(&args, &logs, shell).map_err(refuse));
-    made.err().unwrap_or(0)
+    check(&args).map_err(refuse)?;
+    let logs: Vec<Log> = args.logs.iter().map(|path| read(path, &args, shell)).collect::<Result<_, _>>()?;
+    make(&args, &logs, shell).map_err(refuse).map(|()| 0)
 }
 
 /// Checks the arguments and the files to write, before the long calculation.
@@ -110,10 +109,6 @@ fn make(args: &PadArgs, logs: &[Log], shell: &Shell) -> Result<(), String> {
         shell.say(&format!("wrote {}", path.display()));
     }
     Ok(())
-}
-
-fn write(path: &Path, text: &str) -> Result<(), String> {
-    std::fs::write(path, text).map_err(|error| format!("cannot write `{}`: {error}", path.display()))
 }
 
 /// Returns the comment of the file: how it was made.

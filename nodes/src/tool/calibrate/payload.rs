@@ -3,6 +3,7 @@
 use nalgebra::Vector3;
 
 use crate::calibration::tool_weight::WeightFit;
+use crate::tool::guided::vectors::three;
 use crate::tool::guided::{GuidedCell, Left};
 
 /// Checks that the frame of the tip is that of the flange, in which a controller expects the centre of its payload.
@@ -26,7 +27,7 @@ pub(super) fn payload(cell: &mut GuidedCell<'_>, found: &WeightFit, tip: &str) -
     let (by, side) = (found.mass.abs(), if found.mass > 0.0 { "less" } else { "more" });
     shell.say(&format!(
         "the controller subtracts {by:.3} kg {side} than the tool weighs, at {} mm in the frame of the flange `{tip}`",
-        millimetres(&found.centre)
+        three(&(found.centre * 1e3), 1)
     ));
     let question = format!(
         "Which payload is set on the robot? Write its mass [kg] and its centre x y z in the frame of the flange `{tip}` [mm], \
@@ -42,7 +43,7 @@ pub(super) fn payload(cell: &mut GuidedCell<'_>, found: &WeightFit, tip: &str) -
                 shell.say(&format!(
                     "set the payload to {mass:.3} kg with its centre at {} mm in the frame of the flange `{tip}`, and \
                      `tool_mass = {mass:.3}` in the bench if it has one",
-                    millimetres(&centre)
+                    three(&(centre * 1e3), 1)
                 ));
                 return Ok(0);
             }
@@ -68,11 +69,6 @@ fn corrected(payload: &str, lacking: &WeightFit) -> Result<(f64, Vector3<f64>), 
         ));
     }
     Ok((sum, (Vector3::new(x, y, z) * (1e-3 * mass) + lacking.centre * lacking.mass) / sum))
-}
-
-/// Writes a vector [m] in millimetres.
-pub(super) fn millimetres(vector: &Vector3<f64>) -> String {
-    format!("[{:.1}, {:.1}, {:.1}]", vector.x * 1e3, vector.y * 1e3, vector.z * 1e3)
 }
 
 #[cfg(test)]

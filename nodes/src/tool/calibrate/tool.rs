@@ -9,11 +9,12 @@ use tactflow_runtime::graph::open_bench;
 use tactflow_runtime::signal::{Features, FeaturesShape, Joints, Shape};
 
 use super::average::Average;
-use super::payload::{check_flange, millimetres, payload};
+use super::payload::{check_flange, payload};
 use crate::calibration::tool_weight::{
     MIN_POSTURES, MIN_SPREAD, WeightFit, WeightPosture, WeightUnfit, fit, next_side, side_down,
 };
 use crate::motion::weight::{GRAVITY, weight};
+use crate::tool::guided::vectors::three;
 use crate::tool::guided::{BenchFile, BoundRole, CellPort, GuidedArm, GuidedCell, Left, numbers};
 
 /// Weigh the tool: hold the arm still in four postures
@@ -57,18 +58,12 @@ struct Sensor {
     tip: String,
 }
 
-pub(super) fn run(args: &ToolArgs, shell: &Shell) -> u8 {
-    let mut cell = match GuidedCell::open(shell, &args.bench) {
-        Ok(cell) => cell,
-        Err(code) => return code,
-    };
+pub(super) fn run(args: &ToolArgs, shell: &Shell) -> Result<u8, u8> {
+    let mut cell = GuidedCell::open(shell, &args.bench)?;
     let found = Sensor::find(&cell, args).and_then(|sensor| Ok((sensor, BenchFile::read(&args.bench)?)));
-    let (sensor, mut bench) = match found {
-        Ok(found) => found,
-        Err(message) => return shell.refuse(message),
-    };
+    let (sensor, mut bench) = found.map_err(|why| shell.refuse(why))?;
     let done = sensor.weigh(&mut cell).and_then(|found| conclude(&mut cell, &sensor, &found, &mut bench));
-    done.unwrap_or_else(|left| left.report(shell))
+    done.map_err(|left| left.report(shell))
 }
 
 impl Sensor {
@@ -80,7 +75,9 @@ impl Sensor {
             return Err(format!("`wrench` of device `{}` is not a force and a torque", bound.device));
         }
         let fact = |name: &str| description.fact_on(bound.side.as_deref(), "force_sensor", name);
-        let subtracted = fact("tool_mass").and_then(number).zip(fact("tool_com").and_then(vector));
+        let mass = fact("tool_mass").and_then(toml::Value::as_float);
+        let centre = fact("tool_com").and_then(|centre| centre.clone().try_into::<[f64; 3]>().ok());
+        let subtracted = mass.zip(centre.map(Vector3::from));
         let is_own = cell.port::<Joints>(&bound, "position").is_some();
         let own = is_own.then_some(&*bound.role);
         let arm = GuidedArm::find(cell, args.arm.as_deref().or(own))?;
@@ -149,15 +146,6 @@ fn has_six(shape: &FeaturesShape) -> bool {
     shape.names().count() == 6
 }
 
-fn number(fact: &toml::Value) -> Option<f64> {
-    fact.as_float()
-}
-
-fn vector(fact: &toml::Value) -> Option<Vector3<f64>> {
-    let list: Vec<f64> = fact.as_array()?.iter().map(number).collect::<Option<_>>()?;
-    Some(<[f64; 3]>::try_from(list).ok()?.into())
-}
-
 /// Describes a posture that was measured.
 fn described(posture: &WeightPosture) -> String {
     let (side, angle) = side_down(&posture.tip);
@@ -178,14 +166,10 @@ fn progress(fitted: &Result<WeightFit, WeightUnfit>, count: usize) -> String {
 }
 
 fn lines_of(found: &WeightFit) -> String {
+    let [centre, deviation] = [found.centre, found.centre_deviation].map(|vector| three(&(vector * 1e3), 1));
     format!(
-        "mass {:.3} kg ± {:.3}, centre {} mm ± {}, residual {:.2} N and {:.3} N m",
-        found.mass,
-        found.mass_deviation,
-        millimetres(&found.centre),
-        millimetres(&found.centre_deviation),
-        found.force_residual,
-        found.torque_residual
+        "mass {:.3} kg ± {:.3}, centre {centre} mm ± {deviation}, residual {:.2} N and {:.3} N m",
+        found.mass, found.mass_deviation, found.force_residual, found.torque_residual
     )
 }
 
@@ -223,7 +207,7 @@ fn conclude(cell: &mut GuidedCell<'_>, sensor: &Sensor, found: &WeightFit, bench
             Ok(FAULTED)
         }
         Some((mass, centre)) => {
-            shell.say(&format!("the bench has mass {mass:.3} kg, centre {} mm", millimetres(&centre)));
+            shell.say(&format!("the bench has mass {mass:.3} kg, centre {} mm", three(&(centre * 1e3), 1)));
             write(cell, &sensor.bound, found, bench)
         }
     }

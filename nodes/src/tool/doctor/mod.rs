@@ -104,15 +104,10 @@ impl Finding {
     }
 }
 
-pub(super) fn run(args: DoctorArgs, shell: &Shell) -> u8 {
-    let bench = match open_bench(shell.catalogue(), &args.bench) {
-        Ok(bench) => bench,
-        Err(report) => return shell.reject(&report),
-    };
-    let interrupt = match Interrupt::catch() {
-        Ok(interrupt) => interrupt,
-        Err(error) => return shell.refuse(format_args!("cannot watch for Ctrl-C: {error}")),
-    };
+pub(super) fn run(args: DoctorArgs, shell: &Shell) -> Result<u8, u8> {
+    let bench = open_bench(shell.catalogue(), &args.bench).map_err(|report| shell.reject(&report))?;
+    let interrupt = Interrupt::catch();
+    let interrupt = interrupt.map_err(|error| shell.refuse(format_args!("cannot watch for Ctrl-C: {error}")))?;
     let mut worst = print(shell, "this computer", &host::examine());
     let OpenBench { devices, bind } = bench;
     let roles = |device: &str| -> Vec<String> {
@@ -147,16 +142,15 @@ pub(super) fn run(args: DoctorArgs, shell: &Shell) -> u8 {
         }
     }
     #[cfg(feature = "drivers")]
-    match args.press.examine(shell, &args.bench, args.duration, &described) {
-        Ok(severity) => worst = worst.max(severity),
-        Err(code) => return code,
+    {
+        worst = worst.max(args.press.examine(shell, &args.bench, args.duration, &described)?);
     }
     if args.moves && worst != Severity::Problem {
         worst = worst.max(prove(shell, &args.bench, &arms, &bind));
     } else if args.moves {
         shell.say("not moved, because of the problems above");
     }
-    if worst == Severity::Problem { FAULTED } else { 0 }
+    Ok(if worst == Severity::Problem { FAULTED } else { 0 })
 }
 
 /// Proves for each arm that must be commissioned that it stops by itself.

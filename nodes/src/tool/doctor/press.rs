@@ -13,6 +13,7 @@ use super::symmetry::CORNERS;
 use super::touch::{Event, Feeler, Touch};
 use super::{Finding, Severity, place, print};
 use crate::arm::mount::Mount;
+use crate::tool::guided::vectors::three;
 use crate::tool::guided::{BoundRole, CellPort, GuidedArm, GuidedCell, Left, mount};
 
 /// Time that a pad has for its first image [s].
@@ -68,11 +69,8 @@ impl PressArgs {
             return Ok(Severity::Fine);
         }
         let cell = GuidedCell::open(shell, bench)?;
-        let arm = match GuidedArm::find(&cell, self.arm.as_deref()) {
-            Ok(arm) => Some(arm),
-            Err(why) if self.arm.is_some() => return Err(shell.refuse(why)),
-            Err(_) => None,
-        };
+        let arm = GuidedArm::find(&cell, self.arm.as_deref());
+        let arm = arm.map(Some).or_else(|why| self.arm.as_ref().map_or(Ok(None), |_| Err(shell.refuse(why))))?;
         let mut dialogue = Dialogue { cell, arm, patience: self.patience };
         dialogue.examine(watched, devices).map_err(|left| match left {
             Left::Interrupted => {
@@ -234,8 +232,7 @@ impl Dialogue<'_> {
 /// Returns the place of a corner in the base, as text.
 fn at(corner: [f64; 2], pad: &Pad, pose: Option<&IsometryMatrix3<f64>>) -> String {
     pose.map_or_else(String::new, |pose| {
-        let [x, y, z] = place::point(place::corner(corner, &pad.shape), pose);
-        format!(", at [{x:.3}, {y:.3}, {z:.3}] m")
+        format!(", at {} m", three(&place::point(place::corner(corner, &pad.shape), pose).into(), 3))
     })
 }
 

@@ -1,14 +1,14 @@
 //! A bench file that is changed in place. Its comments and its order stay.
 
 use std::fs;
+use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 
 use tactflow_runtime::catalogue::Catalogue;
 use tactflow_runtime::graph::open_bench;
 use tactflow_runtime::signal::Joint;
+use tempfile::NamedTempFile;
 use toml_edit::{Array, DocumentMut, Item, Table, TableLike, Value};
-
-use super::temporary::Temporary;
 
 /// The text of a bench, and what is to be changed in it.
 #[derive(Debug, Clone)]
@@ -35,6 +35,14 @@ impl BenchFile {
 
     pub(crate) fn path(&self) -> &Path {
         &self.path
+    }
+
+    /// Returns the values of the file as it was read.
+    ///
+    /// # Errors
+    /// If it is no TOML.
+    pub(crate) fn values(&self) -> Result<toml::Value, String> {
+        toml::from_str(&self.before).map_err(|error| format!("cannot read `{}`: {error}", self.path.display()))
     }
 
     /// Sets a key of a section: of `["devices", "arm"]` for `[devices.arm]`. A comment behind the old value stays.
@@ -124,7 +132,7 @@ impl BenchFile {
         let fail = |error: std::io::Error| format!("cannot write `{path}`: {error}");
         self.refuse_read_only(&self.path)?;
         // Beside the bench, so that the names of its other files stay right.
-        let new = Temporary::write(&self.path, &self.text()).map_err(fail)?;
+        let new = self.write_beside(&self.path).map_err(fail)?;
         let Err(report) = open_bench(catalogue, new.path()) else { return Ok(()) };
         let report = report.render(false).replace(&new.path().display().to_string(), &path.to_string());
         Err(format!("with these lines, `{path}` does not load, so nothing is written\n{report}"))
@@ -143,7 +151,19 @@ impl BenchFile {
             return Err(format!("`{path}` was changed by somebody else meanwhile; nothing is written"));
         }
         self.refuse_read_only(&target)?;
-        Temporary::write(&target, &self.text()).and_then(|new| new.replace(&target)).map_err(fail)
+        let new = self.write_beside(&target).map_err(fail)?;
+        let permissions = fs::metadata(&target).map_err(fail)?.permissions();
+        new.as_file().set_permissions(permissions).and_then(|()| new.as_file().sync_all()).map_err(fail)?;
+        new.persist(&target).map(drop).map_err(|error| fail(error.error))
+    }
+
+    /// Writes the text into a new file in the folder of `target`. It is removed when it is dropped.
+    fn write_beside(&self, target: &Path) -> io::Result<NamedTempFile> {
+        let prefix = format!(".{}.", target.file_name().unwrap_or_default().to_string_lossy());
+        let folder = target.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
+        let mut new = tempfile::Builder::new().prefix(&prefix).suffix(".new").tempfile_in(folder)?;
+        new.write_all(self.text().as_bytes())?;
+        Ok(new)
     }
 
     fn refuse_read_only(&self, target: &Path) -> Result<(), String> {

@@ -4,7 +4,7 @@
 mod arm;
 mod bench_file;
 pub(super) mod mount;
-mod temporary;
+pub(super) mod vectors;
 
 use std::io::BufRead;
 use std::path::Path;
@@ -17,6 +17,7 @@ use tactflow_runtime::device::{Attached, Driver, Output};
 use tactflow_runtime::engine::Interrupt;
 use tactflow_runtime::graph::{BenchDevice, OpenBench, open_bench};
 use tactflow_runtime::signal::Signal;
+use tactflow_runtime::source::quoted;
 
 pub(super) use arm::{GuidedArm, StillPosture, chain};
 pub(super) use bench_file::{BenchFile, joint_numbers, numbers};
@@ -133,26 +134,11 @@ impl<'s> GuidedCell<'s> {
         option: &str,
     ) -> Result<(BoundRole, CellPort<T>), String> {
         let fitting: Vec<_> =
-            self.bound.iter().filter_map(|bound| Some((bound, self.port::<T>(bound, output)?))).collect();
-        let names = || fitting.iter().map(|(bound, _)| format!("`{}`", bound.role)).collect::<Vec<_>>().join(", ");
-        let found = |index: usize| (fitting[index].0.clone(), fitting[index].1);
-        // A device that fills several roles is the same arm in each.
-        let is_one = |list: &[(&BoundRole, CellPort<T>)]| {
-            list.windows(2).all(|two| (&two[0].0.device, &two[0].0.side) == (&two[1].0.device, &two[1].0.side))
-        };
-        match (wanted, fitting.len()) {
-            (_, 0) => Err(self.none_of(what)),
-            (None, _) if is_one(&fitting) => Ok(found(0)),
-            (None, _) => {
-                Err(format!("the bench binds several roles with {what}: name one of {} with `{option}`", names()))
-            }
-            (Some(wanted), _) => {
-                let index = fitting.iter().position(|(bound, _)| bound.role == wanted);
-                index.map(found).ok_or_else(|| {
-                    format!("the bench binds no role `{wanted}` with {what}: write `{option}` with one of {}", names())
-                })
-            }
+            self.bound.iter().filter_map(|bound| Some((bound.clone(), self.port::<T>(bound, output)?))).collect();
+        if fitting.is_empty() {
+            return Err(self.none_of(what));
         }
+        choose(fitting, what, wanted, option)
     }
 
     /// Returns an output of the device that fills a role, if it is live and has one of that name and kind.
@@ -284,6 +270,29 @@ impl<'s> GuidedCell<'s> {
 pub(super) fn bound_role(role: String, word: &str) -> BoundRole {
     let (device, side) = word.split_once('.').map_or((word, None), |(device, side)| (device, Some(side.to_owned())));
     BoundRole { role, device: device.to_owned(), side }
+}
+
+/// Returns the role `wanted` among those that have `what`, or the only one; `option` is the option that names one.
+///
+/// # Errors
+/// If there is no such role, or if there are several and none is wanted.
+pub(super) fn choose<T>(
+    mut fitting: Vec<(BoundRole, T)>,
+    what: &str,
+    wanted: Option<&str>,
+    option: &str,
+) -> Result<(BoundRole, T), String> {
+    let names = quoted(fitting.iter().map(|(bound, _)| &bound.role));
+    // A device that fills several roles is the same arm in each.
+    let is_one = fitting.windows(2).all(|two| (&two[0].0.device, &two[0].0.side) == (&two[1].0.device, &two[1].0.side));
+    let index = match wanted {
+        None if is_one => 0,
+        None => return Err(format!("the bench binds several roles with {what}: name one of {names} with `{option}`")),
+        Some(wanted) => fitting.iter().position(|(bound, _)| bound.role == wanted).ok_or_else(|| {
+            format!("the bench binds no role `{wanted}` with {what}: write `{option}` with one of {names}")
+        })?,
+    };
+    Ok(fitting.swap_remove(index))
 }
 
 /// Reads the standard input on a thread of its own, so that Ctrl-C and the devices are noticed meanwhile.

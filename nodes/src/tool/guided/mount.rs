@@ -10,14 +10,8 @@ pub(crate) fn stated(description: &Description, side: Option<&str>) -> Option<Mo
 }
 
 fn parse(fact: &toml::Value) -> Option<Mount> {
-    let three = |name: &str| -> Option<[f64; 3]> {
-        fact.get(name)?.as_array()?.iter().map(number).collect::<Option<Vec<_>>>()?.try_into().ok()
-    };
+    let three = |name: &str| fact.get(name)?.clone().try_into().ok();
     Some(Mount { xyz: three("xyz")?, rpy: three("rpy")? })
-}
-
-fn number(value: &toml::Value) -> Option<f64> {
-    value.as_float().or_else(|| value.as_integer().map(|integer| integer as f64))
 }
 
 #[cfg(test)]

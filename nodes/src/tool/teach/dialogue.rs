@@ -3,6 +3,7 @@
 use nalgebra::Vector3;
 use toml_edit::{Array, Value};
 
+use super::super::guided::vectors::three;
 use super::super::guided::{BenchFile, GuidedCell, Left, StillPosture, joint_numbers, numbers};
 use super::Step;
 use super::plane::{FreeSide, fit};
@@ -146,7 +147,7 @@ impl<'d, 's> Dialogue<'d, 's> {
     }
 
     fn say_point(&self, point: &Vector3<f64>) {
-        self.say(&format!("  measured, at [{:.4}, {:.4}, {:.4}] m", point.x, point.y, point.z));
+        self.say(&format!("  measured, at {} m", three(point, 4)));
     }
 
     /// Asks for points until `close` makes something of them. Returns `None` if the step is skipped.

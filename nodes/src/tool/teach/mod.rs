@@ -8,10 +8,10 @@ mod workspace;
 
 use std::path::PathBuf;
 
+use tactflow_runtime::cli::Shell;
 use tactflow_runtime::cli::clap::{self, Parser, ValueEnum};
-use tactflow_runtime::cli::{FAULTED, Shell};
 
-use super::guided::{BenchFile, GuidedCell};
+use super::guided::{BenchFile, GuidedCell, Left};
 use dialogue::Dialogue;
 use site::Site;
 
@@ -86,32 +86,15 @@ fn not_negative(text: &str) -> Result<f64, String> {
     finite(text).ok().filter(|number| *number >= 0.0).ok_or_else(|| format!("`{text}` is not a number from 0 on"))
 }
 
-pub(super) fn run(args: TeachArgs, shell: &Shell) -> u8 {
-    let file = match BenchFile::read(&args.bench) {
-        Ok(file) => file,
-        Err(why) => return shell.refuse(why),
-    };
-    let mut cell = match GuidedCell::open(shell, &args.bench) {
-        Ok(cell) => cell,
-        Err(code) => return code,
-    };
-    let site = match Site::find(&cell, &args.bench, args.arm.as_deref(), args.sensor.as_deref()) {
-        Ok(site) => site,
-        Err(why) => return shell.refuse(why),
-    };
+pub(super) fn run(args: TeachArgs, shell: &Shell) -> Result<u8, u8> {
+    let refuse = |why: String| shell.refuse(why);
+    let file = BenchFile::read(&args.bench).map_err(refuse)?;
+    let mut cell = GuidedCell::open(shell, &args.bench)?;
+    let site = Site::find(&cell, &file, args.arm.as_deref(), args.sensor.as_deref()).map_err(refuse)?;
     let steps = [Step::Home, Step::Start, Step::Workspace, Step::KeepOut];
     let steps: Vec<Step> = steps.into_iter().filter(|step| args.only.is_empty() || args.only.contains(step)).collect();
     let mut dialogue = Dialogue::new(&mut cell, &site, [args.margin * 1e-3, args.clearance * 1e-3]);
-    let taught = match dialogue.teach(&steps) {
-        Ok(taught) => taught,
-        Err(left) => return left.report(shell),
-    };
-    let file = match taught.write_into(file, &site) {
-        Ok(file) => file,
-        Err(why) => {
-            shell.error(why);
-            return FAULTED;
-        }
-    };
-    cell.write_after_yes(&file).unwrap_or_else(|left| left.report(shell))
+    let taught = dialogue.teach(&steps).map_err(|left| left.report(shell))?;
+    let file = taught.write_into(file, &site).map_err(|why| Left::Failed(why).report(shell))?;
+    cell.write_after_yes(&file).map_err(|left| left.report(shell))
 }

@@ -2,6 +2,8 @@
 
 use nalgebra::{Matrix3, SymmetricEigen, Vector3};
 
+use crate::tool::guided::vectors::direction;
+
 /// Smallest extent of the touched points across their longest direction [m].
 pub(super) const MIN_WIDTH_M: f64 = 0.02;
 /// Smallest distance of a posture from a plane at which it shows the free side [m].
@@ -77,13 +79,7 @@ impl FreeSide {
 
     /// Returns the free direction in words: an axis of the base, or a unit vector.
     pub(super) fn direction(&self) -> String {
-        let axis = self.normal.iamax();
-        let along = self.normal[axis];
-        let sign = if along > 0.0 { '+' } else { '-' };
-        match along.abs() > MIN_ALONG {
-            true => format!("{sign}{}", ["x", "y", "z"][axis]),
-            false => format!("[{:.2}, {:.2}, {:.2}]", self.normal.x, self.normal.y, self.normal.z),
-        }
+        direction(&self.normal, MIN_ALONG)
     }
 
     /// Returns the row of `keep_out` with the plane moved to the free side by a clearance [m]. It is rounded to 0.1 mm.

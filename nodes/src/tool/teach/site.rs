@@ -6,9 +6,10 @@ use std::path::Path;
 use nalgebra::{IsometryMatrix3, Vector3};
 use tactflow_runtime::graph::{OpenBench, open_bench};
 use tactflow_runtime::signal::{Joints, Shape};
+use tactflow_runtime::source::quoted;
 use toml::Value;
 
-use super::super::guided::{BoundRole, GuidedArm, GuidedCell, mount};
+use super::super::guided::{BenchFile, BoundRole, GuidedArm, GuidedCell, mount};
 use crate::motion::pose::pose_of;
 
 /// An arm of a bench, and the point on it that touches.
@@ -43,7 +44,7 @@ impl Site {
     /// If the bench has no such arm or pad, or several and none is named, or if the arm cannot be taught.
     pub(super) fn find(
         cell: &GuidedCell<'_>,
-        path: &Path,
+        file: &BenchFile,
         arm: Option<&str>,
         sensor: Option<&str>,
     ) -> Result<Self, String> {
@@ -63,7 +64,7 @@ impl Site {
         let arms = arms(cell);
         let mut limits = vec!["limits".to_owned()];
         limits.extend((arms > 1).then(|| role.clone()));
-        let pads = pads(cell, path)?;
+        let pads = pads(cell, file.path())?;
         let pads_of_one_arm = if arms > 1 { 0 } else { pads.len() };
         let (mount, point) = match pad(pads, sensor, arms)? {
             Some((pad, [xyz, rpy])) => {
@@ -71,7 +72,7 @@ impl Site {
             }
             None => (IsometryMatrix3::identity(), format!("the tip of `{role}`")),
         };
-        let text = bench(path)?;
+        let text = file.values()?;
         let rows = rows(&text, &limits)?;
         let is_stated = ["home", "start"].map(|key| section(&text, &["devices", device, key]).is_some());
         let general = (arms > 1).then(|| section(&text, &["limits"]).cloned()).flatten();
@@ -98,8 +99,7 @@ fn arms(cell: &GuidedCell<'_>) -> usize {
 
 /// Reads a list of plain numbers.
 pub(super) fn read_numbers(value: &Value) -> Option<Vec<f64>> {
-    let number = |value: &Value| value.as_float().or_else(|| value.as_integer().map(|number| number as f64));
-    value.as_array()?.iter().map(number).collect()
+    value.clone().try_into().ok()
 }
 
 /// Returns the pads of a bench. A pad may be simulated, so the devices are opened once more, without a connection.
@@ -116,7 +116,7 @@ fn pads(cell: &GuidedCell<'_>, path: &Path) -> Result<Vec<Pad>, String> {
 
 /// Returns the pad of the role `wanted`, or the only one if there is one arm; `None` without a pad.
 fn pad(pads: Vec<Pad>, wanted: Option<&str>, arms: usize) -> Result<Option<Pad>, String> {
-    let names = || pads.iter().map(|(role, _)| format!("`{role}`")).collect::<Vec<_>>().join(", ");
+    let names = || quoted(pads.iter().map(|(role, _)| role));
     match wanted {
         Some("none") => Ok(None),
         Some(wanted) => {
@@ -138,13 +138,6 @@ fn pad(pads: Vec<Pad>, wanted: Option<&str>, arms: usize) -> Result<Option<Pad>,
         )),
         None => Ok(pads.into_iter().next()),
     }
-}
-
-/// Reads the tables of a bench file.
-fn bench(path: &Path) -> Result<Value, String> {
-    let fail = |error: &dyn std::fmt::Display| format!("cannot read `{}`: {error}", path.display());
-    let text = std::fs::read_to_string(path).map_err(|error| fail(&error))?;
-    toml::from_str(&text).map_err(|error| fail(&error))
 }
 
 fn section<'v>(root: &'v Value, names: &[&str]) -> Option<&'v Value> {

@@ -2,6 +2,7 @@
 
 use super::entry::{Category, Entry, ParamEntry, PortEntry};
 use crate::cli::text::prose::{Definition, Element};
+use crate::source::quoted;
 
 /// Builds the page. `has_fits` adds the ports at the other end of each wire; the reference leaves them out, so that a
 /// new node changes no page of another.
@@ -60,11 +61,6 @@ pub(crate) fn capitalised(text: &str) -> String {
 
 fn listed(title: &str, names: &[String]) -> Option<Element> {
     (!names.is_empty()).then(|| Element::Prose(format!("{title}{}.", quoted(names))))
-}
-
-/// Puts names in backticks, with commas between them.
-fn quoted(names: &[String]) -> String {
-    names.iter().map(|name| format!("`{name}`")).collect::<Vec<_>>().join(", ")
 }
 
 fn port_item(port: &PortEntry, prefix: &str, has_fits: bool) -> Definition {

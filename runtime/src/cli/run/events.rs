@@ -1,70 +1,15 @@
-//! What happened in a run: modes, halts, and limits that reduced the motion.
+//! What happened in a run: modes, halts and ends of tasks.
 
 use std::fmt::Write;
 
-use crate::cli::text::number::{number, seconds};
+use crate::cli::text::number::seconds;
 use crate::cli::text::table::table;
 use crate::engine::{Engine, ModeChange, Rest, TaskEnd, TaskRun};
+use crate::fault::Fault;
 use crate::graph::Policy;
-use crate::node::PortId;
-use crate::signal::Scalar;
 
 /// Maximum number of mode changes that are listed from the start, and from the end; also of halts.
 const MAX_LISTED: usize = 20;
-
-/// How much one limit reduced the motion.
-struct LimitUse {
-    /// `node.limit`.
-    name: String,
-    id: PortId,
-    /// Time during which it reduced the motion [s].
-    time: f64,
-    /// Smallest factor by which it scaled the motion [1].
-    smallest_scale: f64,
-}
-
-/// Watches the limits tick by tick.
-pub(crate) struct LimitWatch {
-    limits: Vec<LimitUse>,
-    last: Option<i64>,
-}
-
-impl LimitWatch {
-    pub(crate) fn new(engine: &Engine) -> Self {
-        let limit = |(name, id): (&str, PortId)| LimitUse { name: name.to_owned(), id, time: 0.0, smallest_scale: 1.0 };
-        Self { limits: engine.limits().map(limit).collect(), last: None }
-    }
-
-    /// Adds the last tick of the engine.
-    pub(crate) fn add(&mut self, engine: &Engine) {
-        let dt = seconds(self.last.map_or(0, |last| engine.now() - last));
-        self.last = Some(engine.now());
-        let bus = engine.bus();
-        for limit in &mut self.limits {
-            let Some(&scale) = bus.get::<Scalar>(limit.id) else { continue };
-            // A difference by rounding is no limit.
-            if scale < 1.0 - 1e-6 {
-                limit.time += dt;
-                limit.smallest_scale = limit.smallest_scale.min(scale);
-            }
-        }
-    }
-
-    /// Writes the table of the limits that reduced the motion.
-    pub(crate) fn table(&self, end: i64) -> String {
-        let duration = seconds(end).max(1e-9);
-        let mut rows = vec![["limited by", "time", "part of run", "smallest scale"].map(String::from)];
-        for limit in self.limits.iter().filter(|limit| limit.time > 0.0) {
-            let share = format!("{:.1} %", 100.0 * limit.time / duration);
-            rows.push([limit.name.clone(), format!("{:.3} s", limit.time), share, number(limit.smallest_scale)]);
-        }
-        match (self.limits.len(), rows.len()) {
-            (0, _) => String::new(),
-            (_, 1) => "no limit reduced the motion\n".into(),
-            _ => table(&rows, 1, usize::MAX),
-        }
-    }
-}
 
 /// Writes the modes and the halts, one after the other, and leaves out what the graph does not have.
 pub(crate) fn events(engine: &Engine, end: i64) -> String {
@@ -107,6 +52,11 @@ fn modes(changes: &[ModeChange], end: i64) -> String {
     table(&rows, 1, 3) + "\n"
 }
 
+/// Says how long a fault held the commands.
+fn duration(fault: &Fault, until: Option<i64>) -> String {
+    until.map_or_else(|| "until the end".into(), |until| format!("for {:.3} s", seconds(until - fault.time)))
+}
+
 /// Lists the halts of the commands, each with its fault.
 fn halts(engine: &Engine) -> String {
     let mut text = String::new();
@@ -114,19 +64,11 @@ fn halts(engine: &Engine) -> String {
     for (task, halt) in all.take(MAX_LISTED) {
         let what = if halt.policy == Policy::Stop { "stopped" } else { "held" };
         let of = if task.is_empty() { String::new() } else { format!(" of `{task}`") };
-        let duration = match halt.until {
-            Some(until) => format!("for {:.3} s", seconds(until - halt.fault.time)),
-            None => "until the end".to_owned(),
-        };
         // Writing to a string cannot fail.
-        let _ = writeln!(text, "commands{of} {what} {duration}: {}", halt.fault);
+        let _ = writeln!(text, "commands{of} {what} {}: {}", duration(&halt.fault, halt.until), halt.fault);
     }
     for Rest { role, fault, until } in engine.rests().iter().take(MAX_LISTED) {
-        let duration = match until {
-            Some(until) => format!("for {:.3} s", seconds(until - fault.time)),
-            None => "until the end".to_owned(),
-        };
-        let _ = writeln!(text, "`{role}` stopped {duration}: {fault}");
+        let _ = writeln!(text, "`{role}` stopped {}: {fault}", duration(fault, *until));
     }
     let listed: usize = engine.tasks().iter().map(|task| task.halts().len()).sum();
     let unlisted: u64 = engine.tasks().iter().map(TaskRun::unlisted_halts).sum();

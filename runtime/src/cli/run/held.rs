@@ -1,6 +1,7 @@
-//! What held the arm back: limits that stopped its motion for long, and modes that chatter.
+//! What held the arm back: limits that reduced or stopped its motion, and modes that chatter.
 
-use crate::cli::text::number::seconds;
+use crate::cli::text::number::{number, seconds};
+use crate::cli::text::table::table;
 use crate::engine::{Engine, ModeChange};
 use crate::node::PortId;
 use crate::signal::Scalar;
@@ -16,20 +17,24 @@ const MAX_CHANGES: usize = 20;
 /// Time in which changes of modes are counted [ns].
 const CHATTER_NS: i64 = 5_000_000_000;
 
-/// For how long one limit stopped the motion.
-struct Stop {
+/// How much one limit reduced the motion.
+struct LimitUse {
     /// `node.limit`.
     name: String,
     id: PortId,
-    /// In the current mode [s].
-    in_mode: f64,
-    /// In the whole run [s].
-    in_run: f64,
+    /// Time during which it reduced the motion [s].
+    reduced: f64,
+    /// Smallest factor by which it scaled the motion [1].
+    smallest_scale: f64,
+    /// Time during which it stopped the motion in the current mode [s].
+    stopped_in_mode: f64,
+    /// Time during which it stopped the motion in the whole run [s].
+    stopped: f64,
 }
 
 /// Watches the limits tick by tick.
-pub(crate) struct HoldWatch {
-    stops: Vec<Stop>,
+pub(crate) struct LimitWatch {
+    limits: Vec<LimitUse>,
     /// The warning that the arm starts where a limit stops most motions.
     start: Option<String>,
     mode: Option<usize>,
@@ -38,10 +43,17 @@ pub(crate) struct HoldWatch {
     last: Option<i64>,
 }
 
-impl HoldWatch {
+impl LimitWatch {
     pub(crate) fn new(engine: &Engine, start: Option<String>) -> Self {
-        let stop = |(name, id): (&str, PortId)| Stop { name: name.to_owned(), id, in_mode: 0.0, in_run: 0.0 };
-        Self { stops: engine.limits().map(stop).collect(), start, mode: None, since: 0, last: None }
+        let limit = |(name, id): (&str, PortId)| LimitUse {
+            name: name.to_owned(),
+            id,
+            reduced: 0.0,
+            smallest_scale: 1.0,
+            stopped_in_mode: 0.0,
+            stopped: 0.0,
+        };
+        Self { limits: engine.limits().map(limit).collect(), start, mode: None, since: 0, last: None }
     }
 
     /// Adds the last tick of the engine.
@@ -51,38 +63,58 @@ impl HoldWatch {
         self.last = Some(now);
         if engine.mode_number() != self.mode {
             (self.mode, self.since) = (engine.mode_number(), now);
-            self.stops.iter_mut().for_each(|stop| stop.in_mode = 0.0);
+            self.limits.iter_mut().for_each(|limit| limit.stopped_in_mode = 0.0);
         }
-        for stop in &mut self.stops {
-            if engine.bus().get::<Scalar>(stop.id).is_some_and(|scale| *scale < STOPPED_SCALE) {
-                (stop.in_mode, stop.in_run) = (stop.in_mode + dt, stop.in_run + dt);
+        for limit in &mut self.limits {
+            let Some(&scale) = engine.bus().get::<Scalar>(limit.id) else { continue };
+            // A difference by rounding is no limit.
+            if scale < 1.0 - 1e-6 {
+                limit.reduced += dt;
+                limit.smallest_scale = limit.smallest_scale.min(scale);
             }
+            if scale < STOPPED_SCALE {
+                limit.stopped_in_mode += dt;
+                limit.stopped += dt;
+            }
+        }
+    }
+
+    /// Writes the table of the limits that reduced the motion.
+    pub(crate) fn table(&self, end: i64) -> String {
+        let duration = seconds(end).max(1e-9);
+        let mut rows = vec![["limited by", "time", "part of run", "smallest scale"].map(String::from)];
+        for limit in self.limits.iter().filter(|limit| limit.reduced > 0.0) {
+            let share = format!("{:.1} %", 100.0 * limit.reduced / duration);
+            rows.push([limit.name.clone(), format!("{:.3} s", limit.reduced), share, number(limit.smallest_scale)]);
+        }
+        match (self.limits.len(), rows.len()) {
+            (0, _) => String::new(),
+            (_, 1) => "no limit reduced the motion\n".into(),
+            _ => table(&rows, 1, usize::MAX),
         }
     }
 
     /// Returns what held the arm back in the last mode, if one limit stopped it for most of the time.
     pub(crate) fn cause(&self, engine: &Engine) -> Option<String> {
         let duration = seconds(self.last? - self.since);
-        let worst = self.stops.iter().max_by(|a, b| a.in_mode.total_cmp(&b.in_mode))?;
+        let worst = self.limits.iter().max_by(|a, b| a.stopped_in_mode.total_cmp(&b.stopped_in_mode))?;
         let mode = engine.mode().map(|mode| format!(" in mode `{mode}`")).unwrap_or_default();
-        let share = worst.in_mode / duration.max(1e-9);
+        let share = worst.stopped_in_mode / duration.max(1e-9);
         let start = self.start.iter().map(|start| format!("; the check warned that {start}")).collect::<String>();
         let share_text = format!("{:.0} % of the time{mode}{start}", share * 100.0);
         let text = format!("the arm was held back: `{}` stopped it for {share_text}", worst.name);
-        (share >= MIN_SHARE[0] && worst.in_mode > 0.0).then_some(text)
+        (share >= MIN_SHARE[0] && worst.stopped_in_mode > 0.0).then_some(text)
     }
 
     /// Returns the warnings about limits that stopped the motion for a large part of the run.
     pub(crate) fn warnings(&self, end: i64) -> Vec<String> {
         let duration = seconds(end).max(1e-9);
-        let is_long = |stop: &&Stop| stop.in_run >= MIN_STOPPED_S && stop.in_run / duration >= MIN_SHARE[1];
-        let warning = |Stop { name, in_run, .. }: &Stop| {
-            format!(
-                "warning: `{name}` stopped the motion for {in_run:.3} s, {:.0} % of the run",
-                100.0 * in_run / duration
-            )
+        let is_long = |limit: &&LimitUse| limit.stopped >= MIN_STOPPED_S && limit.stopped / duration >= MIN_SHARE[1];
+        let warning = |LimitUse { name, stopped, .. }: &LimitUse| {
+            let share = 100.0 * stopped / duration;
+            format!("warning: `{name}` stopped the motion for {stopped:.3} s, {share:.0} % of the run")
         };
-        self.stops.iter().filter(is_long).map(warning).collect()
+        self.limits.iter().filter(is_long).map(warning).collect()
     }
 }
 

@@ -31,7 +31,7 @@ use crate::engine::{self, End, Engine, Interrupt, Outcome, RunOptions};
 use crate::fault::Fault;
 use crate::graph::{Compiled, Request};
 use crate::record::PointsRequest;
-use crate::source::Code;
+use crate::source::{Code, quoted};
 
 pub use commissioning::{Commissioning, Proof};
 pub use time::duration;
@@ -247,9 +247,8 @@ impl Job {
         let words = engine.words();
         let is_unknown = |word: &str| !is_own(word) && words.iter().all(|known| known != word);
         let Some((_, word)) = self.options.send.iter().find(|(_, word)| is_unknown(word)) else { return Ok(()) };
-        let known: Vec<String> = words.iter().map(|word| format!("`{word}`")).collect();
-        let known = known.join(", ");
-        Err(unknown("word", word, words.iter().map(String::as_str), &format!("this graph accepts {known}")))
+        let accepted = format!("this graph accepts {}", quoted(&words));
+        Err(unknown("word", word, words.iter().map(String::as_str), &accepted))
     }
 }
 

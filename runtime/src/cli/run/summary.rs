@@ -2,8 +2,8 @@
 
 use std::fmt::Write;
 
-use super::events::{LimitWatch, events};
-use super::held::{HoldWatch, chatter};
+use super::events::events;
+use super::held::{LimitWatch, chatter};
 use super::lateness::lateness;
 use super::ports::{PortTable, node_times};
 use crate::cli::text::prose::PageStyle;
@@ -17,7 +17,6 @@ const MAX_BINS: usize = 256;
 /// Collects the summary tick by tick.
 pub(crate) struct Summary {
     limits: LimitWatch,
-    holds: HoldWatch,
     body: Body,
 }
 
@@ -36,13 +35,12 @@ impl Summary {
             true => Body::Ports(PortTable::new(engine)),
             false => Body::View(Box::new(RunView::new(engine, MAX_BINS))),
         };
-        Self { limits: LimitWatch::new(engine), holds: HoldWatch::new(engine, start), body }
+        Self { limits: LimitWatch::new(engine, start), body }
     }
 
     /// Adds the last tick of the engine.
     pub(crate) fn add(&mut self, engine: &Engine) {
         self.limits.add(engine);
-        self.holds.add(engine);
         match &mut self.body {
             Body::View(view) => view.add(engine),
             Body::Ports(ports) => ports.add(engine),
@@ -71,11 +69,11 @@ impl Summary {
         }
         // Writing to a string cannot fail.
         let has_failed = matches!(outcome.end, End::Fault(_)) || !engine.rests().is_empty();
-        for line in self.holds.cause(engine).into_iter().filter(|_| has_failed) {
+        for line in self.limits.cause(engine).into_iter().filter(|_| has_failed) {
             let _ = writeln!(text, "{line}");
         }
         let chatters = engine.tasks().iter().filter_map(|task| chatter(&task.changes()));
-        for warning in self.holds.warnings(outcome.time).into_iter().chain(chatters) {
+        for warning in self.limits.warnings(outcome.time).into_iter().chain(chatters) {
             let _ = writeln!(text, "{warning}");
         }
         for ((port, _), counters) in engine.ports().iter().zip(engine.counters()) {

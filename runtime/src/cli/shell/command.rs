@@ -17,6 +17,24 @@ pub struct Subcommand {
     pub(crate) run: Box<RunCommand>,
 }
 
+/// What a command returns: its exit code. In a `Result`, that of an early end is the error, so that `?` ends the command.
+pub trait CommandEnd {
+    /// Returns the exit code.
+    fn code(self) -> u8;
+}
+
+impl CommandEnd for u8 {
+    fn code(self) -> u8 {
+        self
+    }
+}
+
+impl CommandEnd for Result<u8, u8> {
+    fn code(self) -> u8 {
+        self.unwrap_or_else(|code| code)
+    }
+}
+
 /// Makes a command from a function and from arguments that clap derives.
 ///
 /// ```
@@ -36,9 +54,9 @@ pub struct Subcommand {
 /// });
 /// assert_eq!(greet.name(), "greet");
 /// ```
-pub fn derived<A: Parser>(run: impl Fn(A, &Shell) -> u8 + 'static) -> Subcommand {
+pub fn derived<A: Parser, E: CommandEnd>(run: impl Fn(A, &Shell) -> E + 'static) -> Subcommand {
     let run = move |matches: &clap::ArgMatches, shell: &Shell| {
-        run(A::from_arg_matches(matches).expect("the matches come from this command"), shell)
+        run(A::from_arg_matches(matches).expect("the matches come from this command"), shell).code()
     };
     Subcommand { command: A::command(), run: Box::new(run) }
 }

@@ -62,7 +62,6 @@ impl Shell {
     }
 
     /// Returns the catalogue.
-    #[must_use]
     pub const fn catalogue(&self) -> &Catalogue {
         &self.catalogue
     }

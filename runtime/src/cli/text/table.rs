@@ -1,7 +1,8 @@
 //! Tables with aligned columns.
 
 /// Aligns the cells of the rows: columns from `first_right` up to `first_left` are flush right, the others flush left.
-pub(crate) fn table<const N: usize>(rows: &[[String; N]], first_right: usize, first_left: usize) -> String {
+#[must_use]
+pub fn table<const N: usize>(rows: &[[String; N]], first_right: usize, first_left: usize) -> String {
     let width = |i: usize| rows.iter().map(|row| row[i].chars().count()).max().unwrap_or(0);
     let widths: [usize; N] = std::array::from_fn(width);
     let line = |row: &[String; N]| {

@@ -17,11 +17,7 @@ pub(crate) struct DeviceSlot {
 impl DeviceSlot {
     /// Whether its commands are zero, and a live device has got them.
     pub(crate) fn rests(&self) -> bool {
-        let has_got_them = match &self.link {
-            DeviceLink::Live(linked) => linked.rests(),
-            _ => true,
-        };
-        has_got_them && self.commands.are_zero()
+        self.link.live().is_none_or(Linked::rests) && self.commands.are_zero()
     }
 }
 
@@ -35,4 +31,22 @@ pub(crate) enum DeviceLink {
     Live(Linked),
     /// A device that has failed. The engine does not call it again.
     Gone,
+}
+
+impl DeviceLink {
+    /// Returns the link to a live device that has started.
+    pub(crate) const fn live(&self) -> Option<&Linked> {
+        match self {
+            Self::Live(linked) => Some(linked),
+            _ => None,
+        }
+    }
+
+    /// Returns the driver of a stepped device.
+    pub(crate) fn stepped(&self) -> Option<&dyn Stepped> {
+        match self {
+            Self::Stepped(driver) => Some(&**driver),
+            _ => None,
+        }
+    }
 }

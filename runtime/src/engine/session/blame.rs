@@ -2,7 +2,7 @@
 
 use super::engine::Engine;
 use super::trouble::{Trouble, WatchedWire};
-use crate::engine::core::DeviceLink;
+use crate::device::Linked;
 use crate::fault::{Cause, Fault, StaleWire};
 
 impl Engine {
@@ -35,10 +35,7 @@ impl Engine {
             }
             Trouble::Lease(device) => {
                 let device = &self.devices[device];
-                let refusal = match &device.link {
-                    DeviceLink::Live(linked) => linked.refusal(),
-                    _ => None,
-                };
+                let refusal = device.link.live().and_then(Linked::refusal);
                 let cause = refusal.map_or(Cause::LostLease, Cause::Refused);
                 self.fault(&device.name, None, cause, device.place.clone())
             }

@@ -1,6 +1,7 @@
 //! Receives the signals of the operating system on a thread of its own, whatever the other threads do.
 
-use std::io;
+pub use system::block_io_signals;
+pub(crate) use system::{exit_now, receive};
 
 /// A signal that the process has received.
 #[derive(Debug, Clone, Copy)]
@@ -40,6 +41,7 @@ mod system {
         [SIGINT, SIGTERM, SIGHUP, SIGQUIT, SIGALRM, SIGUSR1, SIGUSR2, SIGXCPU, SIGVTALRM, SIGPROF, SIGIO];
     const SUSPEND: [i32; 3] = [SIGTSTP, SIGTTIN, SIGTTOU];
 
+    /// Starts the thread that receives the signals. The handlers are installed before this returns.
     pub(crate) fn receive(on: impl Fn(Signal) + Send + 'static) -> io::Result<()> {
         let mut signals = Signals::new(END.into_iter().chain(SUSPEND))?;
         let receive = move || {
@@ -51,7 +53,15 @@ mod system {
         Builder::new().name("signals".into()).spawn(receive).map(drop)
     }
 
-    pub(crate) fn block_io_signals() -> io::Result<()> {
+    /// Blocks the signals that report a failed read or write, in this thread and in those that it starts: SIGTTIN and
+    /// SIGTTOU of a terminal in whose background the process is, and SIGXFSZ of a file that reaches `ulimit -f`.
+    ///
+    /// The read or write then succeeds or returns an error. A handler does not suffice: the system would repeat the read
+    /// for ever.
+    ///
+    /// # Errors
+    /// If the operating system refuses it.
+    pub fn block_io_signals() -> io::Result<()> {
         let signals: SigSet = [Blocked::SIGTTIN, Blocked::SIGTTOU, Blocked::SIGXFSZ].into_iter().collect();
         Ok(signals.thread_block()?)
     }
@@ -67,6 +77,7 @@ mod system {
         }
     }
 
+    /// Ends the process without waiting for any lock, buffer or thread.
     pub(crate) fn exit_now(code: i32) -> ! {
         signal_hook::low_level::exit(code)
     }
@@ -89,7 +100,11 @@ mod system {
         Builder::new().name("signals".into()).spawn(receive).map(drop)
     }
 
-    pub(crate) fn block_io_signals() -> io::Result<()> {
+    /// Blocks nothing: such a system does not report it with signals.
+    ///
+    /// # Errors
+    /// Never.
+    pub fn block_io_signals() -> io::Result<()> {
         Ok(())
     }
 
@@ -107,25 +122,3 @@ mod system {
 
 /// Exit code of a process that a signal ended at once.
 pub(crate) const EXIT_INTERRUPTED: i32 = 130;
-
-/// Starts the thread that receives the signals. The handlers are installed before this returns.
-pub(crate) fn receive(on: impl Fn(Signal) + Send + 'static) -> io::Result<()> {
-    system::receive(on)
-}
-
-/// Blocks the signals that report a failed read or write, in this thread and in those that it starts: SIGTTIN and
-/// SIGTTOU of a terminal in whose background the process is, and SIGXFSZ of a file that reaches `ulimit -f`.
-///
-/// The read or write then succeeds or returns an error. A handler does not suffice: the system would repeat the read for
-/// ever.
-///
-/// # Errors
-/// If the operating system refuses it.
-pub fn block_io_signals() -> io::Result<()> {
-    system::block_io_signals()
-}
-
-/// Ends the process without waiting for any lock, buffer or thread.
-pub(crate) fn exit_now(code: i32) -> ! {
-    system::exit_now(code)
-}

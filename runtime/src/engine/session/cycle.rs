@@ -6,7 +6,7 @@ use std::time::Instant;
 use super::engine::Engine;
 use super::task_run::TaskEnd;
 use super::trouble::{Origin, Trouble, panic_message};
-use crate::device::DeviceError;
+use crate::device::{DeviceError, Linked};
 use crate::engine::core::{DeviceLink, Transition};
 use crate::fault::{Cause, Fault};
 use crate::graph::{Policy, PolicyTable};
@@ -332,10 +332,7 @@ impl Engine {
     /// commands, or ramps by itself, gets zero too.
     pub(crate) fn cut_ramp(&mut self) {
         for device in self.devices.iter_mut().filter(|device| !device.rests()) {
-            let is_new = match &device.link {
-                DeviceLink::Live(linked) => linked.cut(),
-                _ => true,
-            };
+            let is_new = device.link.live().is_none_or(Linked::cut);
             device.commands.rest();
             if is_new {
                 tracing::warn!(
@@ -358,10 +355,7 @@ impl Engine {
 
     /// Returns the time of the next sample of a stepped clock device [ns].
     fn clock_sample(&self) -> Option<i64> {
-        match &self.clock()?.link {
-            DeviceLink::Stepped(driver) => driver.next(),
-            _ => None,
-        }
+        self.clock()?.link.stepped()?.next()
     }
 
     /// Hands over the commands of this tick to the live devices, which follow them for a short time.

@@ -5,7 +5,7 @@ use std::time::{Duration, Instant};
 
 use super::engine::Engine;
 use super::trouble::panic_message;
-use crate::device::{LinkSetup, Linked, start};
+use crate::device::{LinkSetup, Linked, start, wait};
 use crate::engine::core::{CommandSlot, DeviceLink};
 
 impl Engine {
@@ -68,22 +68,7 @@ impl Engine {
 
     /// Returns the links whose drivers have not ended.
     fn running(&self) -> impl Iterator<Item = &Linked> {
-        self.links().filter(|linked| !linked.has_ended())
-    }
-
-    fn links(&self) -> impl Iterator<Item = &Linked> {
-        self.devices.iter().filter_map(|device| match &device.link {
-            DeviceLink::Live(linked) => Some(linked),
-            _ => None,
-        })
-    }
-}
-
-/// Waits until something is so, for a time at most.
-fn wait(patience: Duration, is_so: impl Fn() -> bool) {
-    let end = Instant::now() + patience;
-    while !is_so() && Instant::now() < end {
-        std::thread::sleep(Duration::from_millis(1));
+        self.devices.iter().filter_map(|device| device.link.live()).filter(|linked| !linked.has_ended())
     }
 }
 

@@ -190,10 +190,7 @@ impl Engine {
     /// Returns the time of the clock device's last sample, if the device knows it [ns].
     #[must_use]
     pub fn end(&self) -> Option<i64> {
-        match &self.clock()?.link {
-            DeviceLink::Stepped(driver) => driver.end(),
-            _ => None,
-        }
+        self.clock()?.link.stepped()?.end()
     }
 
     /// Returns the device whose samples trigger the ticks; a graph with a rate has none.
@@ -208,7 +205,7 @@ impl Engine {
 
     /// Whether the samples of a stepped device end at a known time.
     pub(super) fn has_end(&self) -> bool {
-        self.devices.iter().any(|device| matches!(&device.link, DeviceLink::Stepped(driver) if driver.end().is_some()))
+        self.devices.iter().any(|device| device.link.stepped().is_some_and(|driver| driver.end().is_some()))
     }
 
     /// Returns the number of the last tick.
@@ -303,11 +300,8 @@ impl Engine {
     /// Keeps the driver of a live device from sending anything to it, as if this process had died, or lets it send again;
     /// see [`Link::is_mute`](crate::device::Link::is_mute).
     pub fn mute(&self, device: &str, is_mute: bool) {
-        for slot in self.devices.iter().filter(|slot| slot.name == device) {
-            if let DeviceLink::Live(linked) = &slot.link {
-                linked.mute(is_mute);
-            }
-        }
+        let named = self.devices.iter().filter(|slot| slot.name == device);
+        named.filter_map(|slot| slot.link.live()).for_each(|linked| linked.mute(is_mute));
     }
 
     /// Returns what the graph reports to a device on `role.report`, or `None` while that is absent or not wired.

@@ -4,7 +4,6 @@ use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 
 use super::engine::Engine;
 use super::punctuality::{Beginning, Punctuality, TickUse};
-use crate::engine::core::DeviceLink;
 
 /// A tick that is later than this part of a period makes the engine measure every tick from then on [1/period].
 const LATE_PART: i64 = 10;
@@ -15,7 +14,7 @@ impl Engine {
     pub(super) fn begin_measured(&mut self, time: i64, due: i64) {
         let wall = SystemTime::now().duration_since(UNIX_EPOCH).map_or(0, |wall| wall.as_nanos() as i64);
         let last = self.punctuality.last;
-        let has_live_clock = self.clock().is_some_and(|clock| matches!(clock.link, DeviceLink::Live(_)));
+        let has_live_clock = self.clock().is_some_and(|clock| clock.link.live().is_some());
         let due = if has_live_clock { last.map_or(time, |last| last.time + self.period()) } else { due };
         let by = (time - due).max(0);
         let is_late = by > self.period() / LATE_PART;

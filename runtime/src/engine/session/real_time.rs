@@ -121,10 +121,7 @@ impl RealTimePacer {
     fn wait(&self, engine: &Engine, next: i64) -> (i64, i64) {
         /// Longest time between two looks at the signals.
         const LOOK: Duration = Duration::from_millis(20);
-        let clock = engine.clock().and_then(|device| match &device.link {
-            DeviceLink::Live(linked) => Some((linked, &device.samples)),
-            _ => None,
-        });
+        let clock = engine.clock().and_then(|device| Some((device.link.live()?, &device.samples)));
         let due = self.epoch + Duration::from_nanos(next.max(0) as u64);
         let has_sampled = || clock.is_some_and(|(linked, samples)| linked.has_sampled(samples));
         loop {

@@ -4,7 +4,7 @@ use std::collections::BTreeSet;
 
 use crate::graph::load::FlatGraph;
 use crate::graph::net::Net;
-use crate::source::{Code, Diagnostic, Diagnostics, Edit, Item, Value};
+use crate::source::{Code, Diagnostic, Diagnostics, Edit};
 
 /// Reports modes that are never entered, and returns the index of the start mode of each task that has modes.
 pub(crate) fn check(net: &Net<'_>, diagnostics: &mut Diagnostics) -> Vec<usize> {
@@ -62,19 +62,8 @@ fn reachable(start: usize, task: usize, flat: &FlatGraph) -> BTreeSet<usize> {
     let (mut reached, mut open) = (BTreeSet::from([start]), vec![start]);
     while let Some(mode) = open.pop() {
         // The written targets count, so that a mistake in an exit does not make its target unreachable too.
-        let mut names = Vec::new();
-        modes[mode].table.entries.iter().for_each(|(_, value)| collect_targets(value, &mut names));
-        let next = names.iter().filter_map(|to| numbers.get(to).copied());
+        let next = modes[mode].written_targets().filter_map(|to| numbers.get(to.as_str()?).copied());
         open.extend(next.filter(|to| reached.insert(*to)));
     }
     reached
-}
-
-/// Collects the target modes of the exits in a value.
-fn collect_targets<'v>(value: &'v Value, names: &mut Vec<&'v str>) {
-    match &value.item {
-        Item::Array(items) => items.iter().for_each(|item| collect_targets(item, names)),
-        Item::Table(table) => names.extend(table.get("to").and_then(Value::as_str)),
-        _ => {}
-    }
 }

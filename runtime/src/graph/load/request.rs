@@ -4,6 +4,7 @@ use std::path::PathBuf;
 
 /// Which graph to load, and what to change in it.
 #[derive(Debug, Clone, Default)]
+#[must_use]
 pub struct Request {
     /// The graph file.
     pub graph: PathBuf,
@@ -31,20 +32,17 @@ impl Request {
     }
 
     /// Replaces the bench.
-    #[must_use]
     pub fn bench(mut self, path: impl Into<PathBuf>) -> Self {
         self.bench = Some(path.into());
         self
     }
 
     /// Uses a fraction of the limits of speed and acceleration, from 0 to 1.
-    #[must_use]
     pub fn slow(self, fraction: f64) -> Self {
         Self { slow: Some(fraction), ..self }
     }
 
     /// Overrides a value of the files, for example `nodes.pid.gains.x.kp=3`.
-    #[must_use]
     pub fn set(mut self, assignment: impl Into<String>) -> Self {
         self.set.push(assignment.into());
         self

@@ -1,6 +1,7 @@
 //! Parses a block `[modes.NAME]`, before names are resolved.
 
 use std::ops::Range;
+use std::slice;
 
 use super::correct::{correct_facts, correct_keys};
 use super::read::{read_table, read_word};
@@ -21,6 +22,15 @@ pub(crate) struct ModeBlock {
 }
 
 impl ModeBlock {
+    /// Returns the target modes of the exits as they are written, so also of exits with a mistake.
+    pub(crate) fn written_targets(&self) -> impl Iterator<Item = &Value> {
+        let exits = self.table.entries.iter().flat_map(|(_, value)| match &value.item {
+            Item::Array(items) => items,
+            _ => slice::from_ref(value),
+        });
+        exits.filter_map(|exit| exit.as_table()?.get("to"))
+    }
+
     /// Returns whether the block has one of the diagnostics, so that an exit may be missing.
     pub(crate) fn has_any(&self, diagnostics: &[Diagnostic]) -> bool {
         let holds = |(key, value): &(Key, Value), span: &Range<usize>| {
@@ -39,7 +49,7 @@ pub(crate) struct ModeExit {
 }
 
 /// What an exit of a mode does. If several exits hold in one tick, the first of these kinds wins.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Param)]
 pub(crate) enum ExitKind {
     /// Ends the run with a fault.
     Fail,
@@ -54,12 +64,7 @@ pub(crate) enum ExitKind {
 impl ExitKind {
     /// Returns the key in the block of a mode.
     pub(crate) const fn key(self) -> &'static str {
-        match self {
-            Self::Fail => "fail",
-            Self::OnLost => "on_lost",
-            Self::Done => "done",
-            Self::Go => "go",
-        }
+        Self::CONTENTS.words[self as usize].0
     }
 }
 

@@ -7,12 +7,11 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::ops::Range;
 
 use super::binding::Binding;
+use super::modes::ModeBlock;
 use super::reserved::{INPUTS, LIMITS, MODES, is_name};
 use super::sections::{BenchDocument, GraphDocument};
 use crate::node::Spanned;
-use crate::source::{
-    Code, Diagnostic, Diagnostics, Edit, FactRef, Item, Key, Named, SourceMap, Value, quoted, suggest_name,
-};
+use crate::source::{Code, Diagnostic, Diagnostics, Edit, FactRef, Key, Named, SourceMap, quoted, suggest_name};
 
 /// A reference to a port: the name of the node, role or part, and the port unless the reference is to the whole.
 #[derive(Debug, Clone)]
@@ -130,7 +129,10 @@ impl GraphDocument {
         self.roles = role_keys.into_iter().collect();
         let start = self.graph.iter().filter_map(|(_, graph)| graph.as_ref()?.start.as_ref());
         let mut targets: Vec<Use> = start.map(Use::of).collect();
-        self.modes.iter().flat_map(|mode| &mode.table.entries).for_each(|(_, value)| add_targets(value, &mut targets));
+        let written = self.modes.iter().flat_map(ModeBlock::written_targets);
+        targets.extend(
+            written.filter_map(|to| Some(Use { name: to.as_str()?.into(), port: None, span: to.span.clone() })),
+        );
         let modes = self.modes.iter_mut().map(|mode| &mut mode.key);
         found.extend(correct(Code::UnknownMode, modes, &targets, &|_, _| true, true, sources));
         found
@@ -164,18 +166,6 @@ impl BenchDocument {
         let uses: Vec<Use> = self.bind.iter().map(|(_, binding)| Use::of(&binding.word)).collect();
         let devices = self.devices.iter_mut().map(|device| &mut device.key);
         correct(Code::UnknownDevice, devices, &uses, &|_, _| true, false, sources)
-    }
-}
-
-/// Collects the target modes of the exits in a value.
-fn add_targets(value: &Value, targets: &mut Vec<Use>) {
-    match &value.item {
-        Item::Array(items) => items.iter().for_each(|item| add_targets(item, targets)),
-        Item::Table(table) => {
-            let to = table.get("to").and_then(|to| Some((to.as_str()?, &to.span)));
-            targets.extend(to.map(|(name, span)| Use { name: name.into(), port: None, span: span.clone() }));
-        }
-        _ => {}
     }
 }
 

@@ -2,10 +2,10 @@
 
 use super::read::read_word;
 use crate::node::{Map, Param, Reader, Spanned, Written};
-use crate::source::{Item, SourceMap, Table, Value};
+use crate::source::Value;
 
 /// The reaction to a trouble.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Param)]
 pub enum Policy {
     /// Count it.
     Count,
@@ -28,33 +28,13 @@ impl Policy {
     }
 }
 
-impl Param for Policy {
-    const EXPECTS: &'static str = "`count`, `hold`, `stop` or `fault`";
-
-    fn read(value: &Value, reader: &mut Reader<'_>) -> Option<Self> {
-        read_word(value, &Self::WORDS, Self::EXPECTS, reader)
-    }
-
-    fn written(&self) -> Option<Written> {
-        Some(self.word().into())
-    }
-}
-
 /// What follows when a part that is a task fails.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Param)]
 pub(crate) enum OnFail {
     /// Its commands ramp to zero, and the other tasks go on.
     Part,
     /// The run ends.
     Run,
-}
-
-impl Param for OnFail {
-    const EXPECTS: &'static str = "`part` or `run`";
-
-    fn read(value: &Value, reader: &mut Reader<'_>) -> Option<Self> {
-        read_word(value, &[("part", Self::Part), ("run", Self::Run)], Self::EXPECTS, reader)
-    }
 }
 
 /// Periods after which a value is too old, unless the graph sets another limit.
@@ -70,31 +50,21 @@ pub(crate) fn default_max_age_ns(period: f64) -> i64 {
     (default_max_age_s(period) * 1e9) as i64
 }
 
-/// A policy that halts commands, for troubles that must not be ignored.
+/// A policy that is at least as strict as number `LEAST`, for troubles that must not be ignored.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) struct HaltingPolicy(pub(crate) Policy);
+pub(crate) struct PolicyFrom<const LEAST: usize>(pub(crate) Policy);
 
-impl Param for HaltingPolicy {
-    const EXPECTS: &'static str = "`hold`, `stop` or `fault`";
-
-    fn read(value: &Value, reader: &mut Reader<'_>) -> Option<Self> {
-        read_word(value, &Policy::WORDS[1..], Self::EXPECTS, reader).map(Self)
-    }
-
-    fn written(&self) -> Option<Written> {
-        self.0.written()
-    }
-}
-
+/// A policy that halts commands.
+pub(crate) type HaltingPolicy = PolicyFrom<{ Policy::Hold as usize }>;
 /// A policy for a budget of motion that is spent. Its arm rests in any case.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) struct BudgetPolicy(pub(crate) Policy);
+pub(crate) type BudgetPolicy = PolicyFrom<{ Policy::Stop as usize }>;
 
-impl Param for BudgetPolicy {
-    const EXPECTS: &'static str = "`stop` or `fault`";
+impl<const LEAST: usize> Param for PolicyFrom<LEAST> {
+    const EXPECTS: &'static str =
+        if LEAST == Policy::Stop as usize { "`stop` or `fault`" } else { "`hold`, `stop` or `fault`" };
 
     fn read(value: &Value, reader: &mut Reader<'_>) -> Option<Self> {
-        read_word(value, &Policy::WORDS[2..], Self::EXPECTS, reader).map(Self)
+        read_word(value, &Policy::WORDS[LEAST..], Self::EXPECTS, reader).map(Self)
     }
 
     fn written(&self) -> Option<Written> {
@@ -147,6 +117,7 @@ pub(crate) struct RolePolicy {
 
 /// The section `[policy]`.
 #[derive(Debug, Clone, Param)]
+#[param(default)]
 pub(crate) struct PolicyTable {
     /// The newest sample of a role is too old.
     #[param(default = Policy::Hold)]
@@ -155,20 +126,20 @@ pub(crate) struct PolicyTable {
     #[param(default = Policy::Hold)]
     pub(crate) clock: Policy,
     /// A value is not a finite number.
-    #[param(default = HaltingPolicy(Policy::Fault))]
+    #[param(default = PolicyFrom(Policy::Fault))]
     pub(crate) not_finite: HaltingPolicy,
     /// A tick began more than one period late. Applies to a real clock only.
     #[param(default = Policy::Count)]
     pub(crate) deadline: Policy,
     /// The budget of motion without a contact is spent. `stop` stops the arm of that limiter alone, until a contact or
     /// `resume` refills the budget.
-    #[param(default = BudgetPolicy(Policy::Stop))]
+    #[param(default = PolicyFrom(Policy::Stop))]
     pub(crate) blind: BudgetPolicy,
     /// A node panicked.
-    #[param(default = HaltingPolicy(Policy::Fault))]
+    #[param(default = PolicyFrom(Policy::Fault))]
     pub(crate) panic: HaltingPolicy,
     /// A device failed.
-    #[param(default = HaltingPolicy(Policy::Fault))]
+    #[param(default = PolicyFrom(Policy::Fault))]
     pub(crate) device: HaltingPolicy,
     /// Maximum age of the newest sample of a role. The default is five periods of its device.
     #[param(unit = "ms", above = 0.0)]
@@ -176,14 +147,6 @@ pub(crate) struct PolicyTable {
     /// Policies of individual roles.
     #[param(default = Map(std::collections::BTreeMap::new()))]
     pub(crate) roles: Map<RolePolicy>,
-}
-
-impl Default for PolicyTable {
-    fn default() -> Self {
-        let empty = Value { span: 0..0, item: Item::Table(Table::default()) };
-        let sources = SourceMap::default();
-        Self::read(&empty, &mut Reader::new(&sources)).expect("every policy has a default")
-    }
 }
 
 impl PolicyTable {

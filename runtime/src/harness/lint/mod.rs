@@ -34,12 +34,12 @@ pub type CountAllocations = fn(&mut dyn FnMut()) -> u64;
 ///   counter: [`Lint::counting`].
 ///
 /// An example with a live device is loaded, but not run.
-#[must_use]
 pub fn lint(catalogue: &Catalogue) -> Lint<'_> {
     Lint { catalogue, count: None, only: Vec::new(), without_example: Vec::new(), quiet: Vec::new() }
 }
 
 /// A check of a catalogue; see [`lint`].
+#[must_use]
 pub struct Lint<'c> {
     catalogue: &'c Catalogue,
     count: Option<CountAllocations>,
@@ -71,25 +71,21 @@ impl fmt::Display for Violation {
 impl Lint<'_> {
     /// Checks the allocations of each step, with a counting allocator of the test: the `allocation-counter` crate has
     /// one, as `.counting(|step| allocation_counter::measure(step).count_total)`.
-    #[must_use]
     pub fn counting(self, count: CountAllocations) -> Self {
         Self { count: Some(count), ..self }
     }
 
     /// Checks only these nodes, devices and roles. The rest of the catalogue serves their examples.
-    #[must_use]
     pub fn only(self, names: &[&str]) -> Self {
         Self { only: names.iter().map(|name| (*name).to_owned()).collect(), ..self }
     }
 
     /// Does not load the examples of these entries, for example of a device that connects when it is opened.
-    #[must_use]
     pub fn without_example_of(self, names: &[&str]) -> Self {
         Self { without_example: names.iter().map(|name| (*name).to_owned()).collect(), ..self }
     }
 
     /// Accepts that these outputs, as `node.output`, have no value in their example.
-    #[must_use]
     pub fn accepting_silence_of(self, outputs: &[&str]) -> Self {
         Self { quiet: outputs.iter().map(|output| (*output).to_owned()).collect(), ..self }
     }

@@ -89,18 +89,7 @@ const KEYS: [&str; 7] = ["cells", "reading", "factor", "reading_per_s", "delay_m
 
 impl FaultKind {
     const fn word(self) -> &'static str {
-        match self {
-            Self::Dead => "dead",
-            Self::Stuck => "stuck",
-            Self::Nan => "nan",
-            Self::Spike => "spike",
-            Self::Garbage => "garbage",
-            Self::Gain => "gain",
-            Self::Drift => "drift",
-            Self::Repeat => "repeat",
-            Self::Missing => "missing",
-            Self::Late => "late",
-        }
+        Self::CONTENTS.words[self as usize].0
     }
 
     /// Returns the keys that the fault needs, each with an example.

@@ -22,12 +22,7 @@ impl Turn {
 
     /// Returns the word of a description for it.
     pub(crate) const fn word(self) -> &'static str {
-        match self {
-            Self::Transpose => "transpose",
-            Self::FlipX => "flip_x",
-            Self::FlipY => "flip_y",
-            Self::Rot90 => "rot90",
-        }
+        Self::CONTENTS.words[self as usize].0
     }
 }
 

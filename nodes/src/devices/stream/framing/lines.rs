@@ -3,19 +3,21 @@
 //! What comes before the first end of a line may be the rest of a line, so it is no frame. With a mark, the first three
 //! frames are judged when the mark after them has come. From then on a frame is delivered with its last value.
 
-use super::{Counts, IsSound, Pending};
+use bytes::BytesMut;
+
+use super::{Counts, IsSound, take_until};
 
 /// Number of frames in a row after which a frame is believed before the mark behind it has come.
 const ROW: u32 = 3;
 
 /// Finds frames in lines.
-#[derive(Clone)]
+#[derive(Clone, Default)]
 pub(crate) struct Lines {
     /// How the line that ends a frame begins; empty for an empty line. `None` if each line is a frame.
     mark: Option<Vec<u8>>,
     /// Maximum number of bytes of a frame.
     longest: usize,
-    pending: Pending,
+    pending: BytesMut,
     /// The lines of the frame so far.
     text: Vec<u8>,
     /// Whether the beginning of the next line is known.
@@ -40,23 +42,11 @@ enum Line {
 
 impl Lines {
     pub(crate) fn new(mark: Option<Vec<u8>>, longest: usize) -> Self {
-        let text = Vec::with_capacity(longest);
-        Self {
-            mark,
-            longest,
-            pending: Pending::default(),
-            text,
-            is_aligned: false,
-            has_begun: false,
-            is_delivered: false,
-            row: 0,
-            is_over: false,
-            counts: Counts::default(),
-        }
+        Self { mark, longest, text: Vec::with_capacity(longest), ..Self::default() }
     }
 
     pub(super) fn push(&mut self, bytes: &[u8]) {
-        self.pending.push(bytes);
+        self.pending.extend_from_slice(bytes);
     }
 
     pub(super) fn forget(&mut self) {
@@ -66,8 +56,7 @@ impl Lines {
     }
 
     pub(super) fn next(&mut self, is_sound: IsSound<'_>) -> Option<&[u8]> {
-        while let Some(range) = self.pending.take_until(b'\n') {
-            let line = self.pending.bytes[range].to_vec();
+        while let Some(line) = take_until(&mut self.pending, b'\n') {
             let line = line.strip_suffix(b"\r").unwrap_or(&line);
             if !std::mem::replace(&mut self.is_aligned, true) || line.len() > self.longest {
                 self.counts.skipped += line.len() as u64 + 1;
@@ -83,8 +72,8 @@ impl Lines {
             }
         }
         // A line without an end must not grow for ever.
-        if self.pending.rest().len() > self.longest {
-            self.counts.skipped += self.pending.rest().len() as u64;
+        if self.pending.len() > self.longest {
+            self.counts.skipped += self.pending.len() as u64;
             self.pending.clear();
             self.is_aligned = false;
             self.break_off();

@@ -11,24 +11,14 @@ pub(crate) mod packets;
 pub(crate) mod replies;
 pub(crate) mod rule;
 
-use std::ops::Range;
+pub(crate) use crate::devices::link::Counts;
 
+use bytes::{Buf, BytesMut};
 use lines::Lines;
 use marked::Marked;
 use messages::Messages;
 use packets::Packets;
 use replies::Replies;
-
-/// What framing has counted.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
-pub(crate) struct Counts {
-    /// Frames that were complete and wrong, or not where they should be.
-    pub(crate) rejected: u64,
-    /// How often the place of the frames was lost.
-    pub(crate) resyncs: u64,
-    /// Bytes that belong to no frame.
-    pub(crate) skipped: u64,
-}
 
 /// Finds the frames in a stream of bytes.
 #[derive(Clone)]
@@ -106,37 +96,12 @@ impl Framer {
     }
 }
 
-/// Bytes that wait, with a position up to which they are done with.
-#[derive(Debug, Clone, Default)]
-struct Pending {
-    bytes: Vec<u8>,
-    start: usize,
-}
-
-impl Pending {
-    /// Adds bytes, and drops those that are done with.
-    fn push(&mut self, bytes: &[u8]) {
-        self.bytes.drain(..self.start);
-        self.start = 0;
-        self.bytes.extend_from_slice(bytes);
-    }
-
-    /// Takes the bytes up to the next `end`, without it. They stay where they are until the next push.
-    fn take_until(&mut self, end: u8) -> Option<Range<usize>> {
-        let length = self.bytes[self.start..].iter().position(|byte| *byte == end)?;
-        let taken = self.start..self.start + length;
-        self.start = taken.end + 1;
-        Some(taken)
-    }
-
-    fn rest(&self) -> &[u8] {
-        &self.bytes[self.start..]
-    }
-
-    fn clear(&mut self) {
-        self.bytes.clear();
-        self.start = 0;
-    }
+/// Takes the bytes up to the next `end`, without it.
+fn take_until(pending: &mut BytesMut, end: u8) -> Option<BytesMut> {
+    let length = pending.iter().position(|byte| *byte == end)?;
+    let taken = pending.split_to(length);
+    pending.advance(1);
+    Some(taken)
 }
 
 #[cfg(test)]

@@ -1,7 +1,9 @@
 //! Packets of COBS or SLIP: a byte that cannot occur in a packet ends it.
 
+use bytes::BytesMut;
+
 use super::rule::Rule;
-use super::{Counts, IsSound, Pending};
+use super::{Counts, IsSound, take_until};
 
 /// How packets are encoded.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -74,7 +76,7 @@ fn decode_slip(packet: &[u8], frame: &mut Vec<u8>) -> bool {
 pub(crate) struct Packets {
     coding: Coding,
     rule: Rule,
-    pending: Pending,
+    pending: BytesMut,
     frame: Vec<u8>,
     /// Whether the beginning of the next packet is known.
     is_aligned: bool,
@@ -84,29 +86,27 @@ pub(crate) struct Packets {
 impl Packets {
     pub(crate) fn new(coding: Coding, rule: Rule) -> Self {
         let frame = Vec::with_capacity(coding.longest(rule.longest()));
-        let pending = Pending::default();
-        Self { coding, rule, pending, frame, is_aligned: false, counts: Counts::default() }
+        Self { coding, rule, pending: BytesMut::new(), frame, is_aligned: false, counts: Counts::default() }
     }
 
     pub(super) fn push(&mut self, bytes: &[u8]) {
-        self.pending.push(bytes);
+        self.pending.extend_from_slice(bytes);
     }
 
     pub(super) fn forget(&mut self) {
-        self.counts.skipped += self.pending.rest().len() as u64;
+        self.counts.skipped += self.pending.len() as u64;
         self.pending.clear();
         self.is_aligned = false;
     }
 
     pub(super) fn next(&mut self, is_sound: IsSound<'_>) -> Option<&[u8]> {
         let longest = self.coding.longest(self.rule.longest());
-        while let Some(range) = self.pending.take_until(self.coding.end()) {
-            let packet = &self.pending.bytes[range];
+        while let Some(packet) = take_until(&mut self.pending, self.coding.end()) {
             let was_aligned = std::mem::replace(&mut self.is_aligned, true);
             if packet.is_empty() {
                 continue;
             }
-            let is_decoded = packet.len() <= longest && self.coding.decode(packet, &mut self.frame);
+            let is_decoded = packet.len() <= longest && self.coding.decode(&packet, &mut self.frame);
             if is_decoded && self.rule.is_whole(&self.frame, is_sound) {
                 return Some(&self.frame);
             }
@@ -115,8 +115,8 @@ impl Packets {
             self.counts.rejected += u64::from(was_aligned);
         }
         // A packet without an end must not grow for ever.
-        if self.pending.rest().len() > longest {
-            self.counts.skipped += self.pending.rest().len() as u64;
+        if self.pending.len() > longest {
+            self.counts.skipped += self.pending.len() as u64;
             self.counts.resyncs += u64::from(self.is_aligned);
             self.pending.clear();
             self.is_aligned = false;

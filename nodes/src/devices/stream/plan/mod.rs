@@ -22,6 +22,7 @@ use crate::devices::stream::framing::Framer;
 use params::Params;
 
 /// Everything that a driver needs to know of a pad.
+#[derive(Clone)]
 pub(crate) struct Plan {
     pub(crate) address: Address,
     pub(crate) baud: u32,

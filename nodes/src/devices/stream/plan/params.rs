@@ -93,7 +93,7 @@ pub struct Params {
     /// For each cell of the image, row after row, the number of its value in the frame, from 0. `order` turns the result.
     pub(crate) lut: Option<Vec<usize>>,
     /// From the values in the frame to `unit`.
-    #[param(default = Scale::NONE)]
+    #[param(default = Scale::default())]
     pub(crate) scale: Scale,
     /// Unit of the image.
     #[param(default = Unit::RAW)]
@@ -101,7 +101,7 @@ pub struct Params {
     /// How a frame is put together, if it comes in parts.
     pub(crate) parts: Option<PartParams>,
     /// The clock of the pad. Without it, the time of arrival counts.
-    #[param(default = ClockParams::NONE)]
+    #[param(default = ClockParams::default())]
     pub(crate) clock: ClockParams,
     /// Whether a frame with the same bytes as the last one is new data: set it for a pad without noise, whose frames are
     /// equal while nothing touches it. A pad that hangs and repeats its last frame is not noticed then.
@@ -133,6 +133,7 @@ pub struct Params {
 
 /// From a value of the frame to a value of the image: `gain * value + offset`, or `gain * (invert_full - value) + offset`.
 #[derive(Debug, Clone, Copy, PartialEq, Param)]
+#[param(default)]
 pub(crate) struct Scale {
     /// The reading of an unloaded tactel, if readings fall with the load.
     #[param(unit = "raw")]
@@ -143,10 +144,6 @@ pub(crate) struct Scale {
     /// Value of the image at the reading 0, or at `invert_full`, in `unit`.
     #[param(unit = "1", default = 0.0)]
     pub(crate) offset: f64,
-}
-
-impl Scale {
-    pub(crate) const NONE: Self = Self { invert_full: None, gain: 1.0, offset: 0.0 };
 }
 
 /// How a frame is put together from parts, which come one after the other.
@@ -170,15 +167,12 @@ pub(crate) struct PartParams {
 
 /// The clock of a pad.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Param)]
+#[param(default)]
 pub(crate) struct ClockParams {
     /// The time of the measurement, in the clock of the pad.
     pub(crate) stamp: Option<StampParams>,
     /// The number of the frame, or of the part.
     pub(crate) counter: Option<Place>,
-}
-
-impl ClockParams {
-    pub(crate) const NONE: Self = Self { stamp: None, counter: None };
 }
 
 /// Where the stamp of a frame stands.
