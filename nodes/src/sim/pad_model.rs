@@ -10,6 +10,8 @@ use crate::devices::{Facts, arm, pad};
 
 /// Largest number of tactels of a simulated pad.
 pub const MAX_TACTELS: usize = 128 * 128;
+/// Default of the largest difference of a zero from the calibrated one: three times the usual threshold [raw].
+pub(super) const TARE_BOUND: f64 = 50.0;
 /// Largest number of points of a simulated pad.
 const MAX_POINTS: f64 = 4e6;
 /// Largest latency of an image [frames].
@@ -34,6 +36,10 @@ pub struct PadModel {
     pub calibration: Option<FilePath>,
     /// Noise threshold that the pad states [N].
     pub threshold: f64,
+    /// Number of frames of the self-test that the pad states.
+    pub rest_frames: usize,
+    /// Largest difference of a zero from the calibrated one that the pad states [raw].
+    pub tare_bound: f64,
     /// Unit of pressure that the pad states [N per tactel].
     pub pressure: f64,
 }
@@ -96,6 +102,8 @@ impl PadModel {
         let mut facts = pad::facts(self.threshold, self.pressure, Unit::NEWTON, calibration);
         let Electronics { common_noise, own_noise, .. } = self.electronics;
         facts.push(pad::mount(mount));
+        let bound = self.calibration.is_some().then_some(self.tare_bound);
+        facts.extend(pad::rest(self.rest_frames, bound, Unit::RAW));
         facts.extend([("common_noise".into(), common_noise.into()), ("own_noise".into(), own_noise.into())]);
         Ok(facts)
     }

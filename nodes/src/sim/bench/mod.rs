@@ -17,7 +17,7 @@ use super::foam::Foam;
 use super::frames::{Beats, Frames};
 use super::joints::SimArm;
 use super::object::{Object, ObjectParams};
-use super::pad_model::PadModel;
+use super::pad_model::{PadModel, TARE_BOUND};
 use super::readout::{Electronics, Readout};
 use super::shape::pose3;
 use super::world::World;
@@ -60,6 +60,12 @@ pub struct Params {
     /// Noise threshold that the pad states as a fact.
     #[param(unit = "N", range = 0.0.., usual = ..=USUAL_THRESHOLD_N, default = 0.015)]
     threshold: f64,
+    /// Number of frames of the self-test at the start, stated as a fact; 0 for none.
+    #[param(default = pad::REST_FRAMES)]
+    rest_frames: usize,
+    /// Largest difference of a zero from that of the `calibration`, stated as a fact if there is one.
+    #[param(unit = "raw", above = 0.0, default = TARE_BOUND)]
+    tare_bound: f64,
     /// Unit of pressure that the pad states as a fact: p = 1 in the paper.
     #[param(unit = "N/tactel", above = 0.0, usual = ..=USUAL_PRESSURE_N, default = 0.1)]
     pressure: f64,
@@ -123,7 +129,7 @@ pub struct Params {
 /// `motion`.
 ///
 /// It runs in virtual time, and the same commands and seed give the same bits; with `--realtime` it is paced by the
-/// clock. The pad states the facts `dead`, `threshold`, `pressure` and `calibration`, and the standard deviations of
+/// clock. The pad states the facts `dead`, `threshold`, `pressure`, `calibration`, `rest_frames` and `tare_bound`, and the standard deviations of
 /// its noise: `common_noise`, which all tactels share, as a fraction of the reading, and `own_noise` of each tactel in
 /// raw counts. The pad also states its `mount`. The arm states `urdf`, `tip` and `home`, which is its start if no `home` is
 /// given. In the role `ground_truth` it provides true values to
@@ -231,6 +237,8 @@ impl Params {
             electronics: self.electronics.clone(),
             calibration: self.calibration.clone(),
             threshold: self.threshold,
+            rest_frames: self.rest_frames,
+            tare_bound: self.tare_bound,
             pressure: self.pressure,
         }
     }

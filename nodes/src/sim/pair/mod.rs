@@ -26,7 +26,7 @@ use super::arm_model::{ArmModel, LoadedArm};
 use super::foam::Foam;
 use super::frames::{Beats, Frames};
 use super::joints::SimArm;
-use super::pad_model::PadModel;
+use super::pad_model::{PadModel, TARE_BOUND};
 use super::readout::{Electronics, Readout};
 use super::shape::pose3;
 use super::steps::check_step;
@@ -77,6 +77,12 @@ pub struct Params {
     /// Noise threshold that the pads state as a fact.
     #[param(unit = "N", range = 0.0.., usual = ..=USUAL_THRESHOLD_N, default = 0.015)]
     threshold: f64,
+    /// Number of frames of the self-test at the start, stated as a fact; 0 for none.
+    #[param(default = pad::REST_FRAMES)]
+    rest_frames: usize,
+    /// Largest difference of a zero from that of the `calibration`, stated as a fact if there is one.
+    #[param(unit = "raw", above = 0.0, default = TARE_BOUND)]
+    tare_bound: f64,
     /// Unit of pressure that the pads state as a fact.
     #[param(unit = "N/tactel", above = 0.0, usual = ..=USUAL_PRESSURE_N, default = 0.1)]
     pressure: f64,
@@ -241,6 +247,8 @@ impl Params {
             electronics: self.electronics.clone(),
             calibration: self.calibration.clone(),
             threshold: self.threshold,
+            rest_frames: self.rest_frames,
+            tare_bound: self.tare_bound,
             pressure: self.pressure,
         }
     }

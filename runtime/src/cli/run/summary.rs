@@ -84,6 +84,11 @@ impl Summary {
                 let _ = writeln!(text, "samples of `{}`: {irregular}", port.name);
             }
         }
+        // A finding that has ended the run stands in its fault already.
+        let is_said = |node: &str| matches!(&outcome.end, End::Fault(fault) if fault.node == node);
+        for (node, found) in engine.findings().filter(|(node, _)| !is_said(node)) {
+            let _ = writeln!(text, "`{node}`: {found}");
+        }
         for (device, counts) in engine.counts().filter(|(_, counts)| !counts.is_empty()) {
             let counts: Vec<String> = counts.iter().map(|(what, count)| format!("{count} {what}")).collect();
             let _ = writeln!(text, "device `{device}`: {}", counts.join(", "));
