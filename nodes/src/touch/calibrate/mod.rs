@@ -68,8 +68,9 @@ use tare::{Averages, Rules};
 /// type = "calibrate"
 /// in.image = "source.image"
 /// device = { from = "pad.calibration" }   # or `file = "pad.toml"`, from `tactflow calibrate`
+/// rest_frames = 40                    # the self-test; without it, the image is there at once
 /// in.present = "label.present"
-/// tare_at_start = true                # the first 50 frames are the zero, if nothing touches the pad
+/// tare_at_start = true                # the next 50 frames are the zero, if nothing touches the pad
 /// ```
 #[derive(Describe)]
 pub struct Calibrate {
@@ -142,8 +143,8 @@ pub struct Outputs {
     /// The calibrated image, in `unit`.
     #[port(unit = "_", frame = "A", quantity = "Q")]
     image: Out<Image>,
-    /// The same image, with the bad tactels filled from the live ones at their sides.
-    #[port(unit = "_", frame = "A", quantity = "Q")]
+    /// The same image, with the bad tactels filled from the live ones at their sides. Limiters do not accept it.
+    #[port(unit = "_", frame = "A", quantity = "repaired_image")]
     repaired: Out<Image>,
     /// Whether the self-test has failed; absent before its end.
     failed: Out<Flag>,
