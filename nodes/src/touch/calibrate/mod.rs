@@ -151,7 +151,8 @@ pub struct Outputs {
     /// Number of bad tactels that the self-test has found.
     #[port(unit = "tactel", frame = "A")]
     bad: Out<Scalar>,
-    /// Median noise of a tactel at rest, a standard deviation.
+    /// Median noise of a tactel at rest: the standard deviation of its readings, without the lowest and the highest one
+    /// of each half of the test.
     #[port(unit = "U", frame = "A")]
     noise: Out<Scalar>,
     /// Largest difference between the zero at rest and the calibrated zero of a sound tactel.

@@ -118,7 +118,9 @@ impl Tally {
 struct Reading {
     /// Difference between its zero and the calibrated one.
     shift: f64,
+    /// Standard deviation within a half.
     noise: f64,
+    /// Difference between the means of the halves.
     drift: f64,
 }
 
@@ -143,8 +145,8 @@ impl RestTest {
             return Err(Mistake::param("rest_frames", message).help(help));
         }
         let &ImageShape { rows, cols, .. } = image;
-        // One tactel in fifty.
-        let max_bad = max_bad.unwrap_or((rows * cols).div_ceil(50));
+        // One tactel in fifty; all of them at most, as room is made for so many.
+        let max_bad = max_bad.unwrap_or((rows * cols).div_ceil(50)).min(rows * cols);
         Ok((frames > 0).then_some(Self { frames, bound, max_bad, rows, cols }))
     }
 
@@ -190,6 +192,7 @@ impl RestTest {
         Reading { shift: 0.5 * (m1 + m2), noise: (0.5 * (v1 + v2)).sqrt(), drift: m2 - m1 }
     }
 
+    /// Returns the verdict on the frames, and notes what it rests on.
     fn judge(&self, is_dead: impl Fn(usize) -> bool, rest: &mut Rest) -> Verdict {
         let live = || (0..rest.tactels.len()).filter(|i| !is_dead(*i));
         let mut sorted = std::mem::take(&mut rest.sorted);
