@@ -46,6 +46,17 @@ fn a_task_whose_object_is_missing_stops_alone() {
 }
 
 #[test]
+fn a_pad_that_fails_its_self_test_stops_its_task_alone() {
+    let folder = Folder::new(&[]);
+    let both = trace(&folder.request().set("devices.left.electronics={ serial = 2 }"), &[]);
+    assert_same_bits(&both, "right", &trace(&folder.alone("right"), &[]));
+    let Some(TaskEnd::Failed(fault)) = both.task("left").end() else { panic!("it has failed") };
+    let Cause::Found(why) = &fault.cause else { panic!("{fault}") };
+    assert!(fault.node == "left.touch.calibrate" && why.starts_with("the calibration does not fit the pad"), "{fault}");
+    assert!(both.are_at_rest("left", 0..both.fastest["left"].len()), "nothing has moved");
+}
+
+#[test]
 fn a_failed_task_fails_the_run_at_its_end() {
     let folder = Folder::new(&[]);
     let out = folder.path("rows.csv").display().to_string();
