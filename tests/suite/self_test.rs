@@ -101,7 +101,7 @@ fn refused(change: impl Fn(&str) -> String, faults: &str) -> String {
         let mut lines = text.lines().filter(|line| !line.starts_with('#'));
         let names: Vec<&str> = lines.next().expect("a header").split(',').collect();
         let is_command = |name: &&str| name.starts_with("move.joints.velocity.");
-        assert!(names.iter().any(|name| is_command(&name)), "{names:?}");
+        assert!(names.iter().any(is_command), "{names:?}");
         for line in lines {
             for (name, value) in names.iter().zip(line.split(',')).filter(|(name, _)| is_command(name)) {
                 assert!(value.is_empty() || value.parse() == Ok(0.0), "{name} is {value}");
