@@ -38,6 +38,8 @@ pub enum Cause {
     Refused(String),
     /// A budget of a limiter is spent.
     Spent,
+    /// A node has found that its task must not go on, for this reason.
+    Found(String),
     /// The operator sent `stop`.
     Operator,
     /// A `fail` condition of a mode holds: its text.
@@ -96,6 +98,7 @@ impl fmt::Display for Fault {
             }
             Cause::Refused(why) => write!(f, "device `{name}` does not follow commands: {why}")?,
             Cause::Spent => write!(f, "`{name}` has spent its budget of motion without a contact")?,
+            Cause::Found(why) => write!(f, "`{name}` has found a fault: {why}")?,
             Cause::Operator => write!(f, "the operator sent `stop`")?,
             Cause::Mode(why) => write!(f, "a `fail` condition of mode `{name}` holds: {why}")?,
             Cause::Lost(why) => write!(f, "`{name}` is lost: {why}")?,

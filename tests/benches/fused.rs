@@ -54,6 +54,8 @@ pub(crate) struct Fused {
     offset: Box<[f32]>,
     alive: Box<[f32]>,
     image: Image,
+    /// What the features are computed from; the recording has no bad tactels to fill.
+    repaired: Image,
     mask: Mask,
     region: Mask,
     regions: Regions,
@@ -117,6 +119,7 @@ impl Fused {
             offset: vec![0.0; rows * cols].into(),
             alive: (0..rows * cols).map(|at| if dead.contains(&at) { 0.0 } else { 1.0 }).collect(),
             image: Image::zeros(rows, cols),
+            repaired: Image::zeros(rows, cols),
             mask: Mask::allocate(&grid),
             region: Mask::allocate(&grid),
             regions: Regions::with_room(rows, cols),
@@ -173,10 +176,11 @@ impl Fused {
         for ((to, from), (offset, gain)) in self.image.cells_mut().iter_mut().zip(cells).zip(lines) {
             *to = (from - offset) * gain;
         }
-        binarize(self.image.cells(), 3.0, &mut self.mask);
+        self.repaired.cells_mut().copy_from_slice(self.image.cells());
+        binarize(self.repaired.cells(), 3.0, &mut self.mask);
         let (runs, regions) = self.regions.parts_mut();
         label::trace(&self.mask, 1, runs);
-        label::number(&self.image, runs, regions);
+        label::number(&self.repaired, runs, regions);
         let contact = label::contact(regions, 6, 100.0);
         self.now += (tick * 1e9) as i64;
         self.contact_at = contact.map(|_| self.now);
@@ -271,7 +275,7 @@ impl Fused {
 
     /// From the region to the twist of the sensor (eqs. 1-3 and 5).
     fn servo(&mut self, dt: f64) -> (Twist, bool) {
-        let sums = moments::Weighing::Force.add_up(&self.image, &self.region);
+        let sums = moments::Weighing::Force.add_up(&self.repaired, &self.region);
         let pressure = self.pressures.mean([sums.force / sums.area, 0.0])[0];
         let (j, i) = (sums.x / sums.force, sums.y / sums.force);
         let (x, y) = (self.shape.x(sums.first[1] + j), self.shape.y(sums.first[0] + i));

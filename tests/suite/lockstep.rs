@@ -81,11 +81,11 @@ pub(crate) fn number(seen: &Value, name: &str) -> f64 {
 fn every_servo_task_runs_on_it_with_no_other_change() {
     let cases = [
         ("force", "--scene pen --seconds 1.5", 375.0),
-        ("position", "--scene ball --offset 0.01 0 --gap -0.0015 --seconds 1", 250.0),
+        ("position", "--scene ball --offset 0.01 0 --gap 0.002 --seconds 1.5", 375.0),
         ("hybrid", "--scene ball --offset 0.01 -0.005 --seconds 1.5", 375.0),
         ("rolling", "--scene ball --offset 0.01 0 --seconds 1.5", 375.0),
-        ("edge", "--scene edge --gap -0.0015 --seconds 0.6", 150.0),
-        ("cable", "--scene cable --radius 0.006 --angle 1.57 --gap -0.0015 --seconds 0.6", 150.0),
+        ("edge", "--scene edge --gap 0.002 --seconds 1", 250.0),
+        ("cable", "--scene cable --radius 0.006 --angle 1.57 --gap 0.002 --seconds 1", 250.0),
         ("explore", "--scene plane --seconds 1", 250.0),
     ];
     for (graph, simulator, frames) in cases {

@@ -69,6 +69,7 @@ mod reference;
 mod reports;
 mod resume;
 mod robots;
+mod self_test;
 #[cfg(unix)]
 mod signals;
 mod sim;

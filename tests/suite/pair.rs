@@ -43,27 +43,27 @@ fn both_pads_face_the_box_from_20_mm_and_lift_it() {
         assert!((pose.translation.vector - place).norm() < 1e-4, "{port}: it is 50 mm beside the middle of the box");
     }
     let mut found = [None; 2];
-    run(&mut engine, 2.3, |now, engine| {
+    run(&mut engine, 2.46, |now, engine| {
         for (found, port) in found.iter_mut().zip(["left_touch.label.present", "right_touch.label.present"]) {
             if get::<bool>(engine, port) == Some(&true) {
                 found.get_or_insert(now);
             }
         }
     });
-    // 20 mm at 10 mm/s, the ramp of the speed, the latency of the image, and the threshold of the foam's force.
+    // The self-test of 0.16 s, 20 mm at 10 mm/s, the ramp of the speed, the latency of the image, and the threshold of the foam's force.
     for found in found {
         let found = found.expect("a pad that moves 23 mm along its z finds the box");
-        assert!((2.0..2.25).contains(&found), "the contact is found after {found} s");
+        assert!((2.16..2.41).contains(&found), "the contact is found after {found} s");
     }
     // Each contact is within two tactels of the centre of its pad, although the arms yield.
     for port in ["left_touch.moments.x", "left_touch.moments.y", "right_touch.moments.x", "right_touch.moments.y"] {
         assert!(scalar(&engine, port).abs() < 0.01, "{port}: {}", scalar(&engine, port));
     }
-    run(&mut engine, 3.2, |_, _| ());
+    run(&mut engine, 3.36, |_, _| ());
     let start = scalar(&engine, "object.z");
     let forces = ["object.left_force", "object.right_force"].map(|port| scalar(&engine, port));
     assert!((forces[0] / forces[1] - 1.0).abs() < 0.01 && forces[0] > 5.0, "{forces:?}");
-    run(&mut engine, 5.0, |_, _| ());
+    run(&mut engine, 5.16, |_, _| ());
     assert_eq!(get::<bool>(&engine, "object.held"), Some(&true));
     assert_eq!(scalar(&engine, "object.table_force"), 0.0);
     let risen = scalar(&engine, "object.z") - start;

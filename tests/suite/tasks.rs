@@ -36,13 +36,25 @@ fn a_task_whose_object_is_missing_stops_alone() {
     let both = trace(&folder.request().set(NO_BALL), &[]);
     assert_same_bits(&both, "right", &trace(&folder.alone("right"), &[]));
     assert_eq!((both.failures(), &both.fault), (vec!["left"], &None));
-    // 60 mm at 12.6 mm/s, from which the pad can stop below its ceiling; the arm starts with 2 m/s² at most.
+    // The self-test of 0.16 s, then 60 mm at 12.6 mm/s, from which the pad can stop below its ceiling; the arm starts
+    // with 2 m/s² at most.
     let Some(TaskEnd::Failed(fault)) = both.task("left").end() else { panic!("it has failed") };
-    assert!((4.75..4.9).contains(&(fault.time as f64 * 1e-9)), "{fault}");
+    assert!((4.91..5.06).contains(&(fault.time as f64 * 1e-9)), "{fault}");
     let end = both.fastest["left"].len();
     assert!(both.are_at_rest("left", fault.tick as usize + 25..end) && !both.are_at_rest("right", end - SECOND..end));
     let flags = ["left.modes.approach", "left.modes.servo", "right.modes.servo"];
     assert_eq!(flags.map(|flag| *both.engine.get::<Flag>(flag).unwrap()), [false, false, true]);
+}
+
+#[test]
+fn a_pad_that_fails_its_self_test_stops_its_task_alone() {
+    let folder = Folder::new(&[]);
+    let both = trace(&folder.request().set("devices.left.electronics={ serial = 2 }"), &[]);
+    assert_same_bits(&both, "right", &trace(&folder.alone("right"), &[]));
+    let Some(TaskEnd::Failed(fault)) = both.task("left").end() else { panic!("it has failed") };
+    let Cause::Found(why) = &fault.cause else { panic!("{fault}") };
+    assert!(fault.node == "left.touch.calibrate" && why.starts_with("the calibration does not fit the pad"), "{fault}");
+    assert!(both.are_at_rest("left", 0..both.fastest["left"].len()), "nothing has moved");
 }
 
 #[test]

@@ -33,3 +33,13 @@ pub(crate) fn facts(threshold: f64, pressure: f64, unit: Unit, calibration: toml
         ("calibration".into(), calibration.into()),
     ]
 }
+
+/// Number of frames of the self-test of a pad, if its bench does not set it.
+pub(crate) const REST_FRAMES: usize = 40;
+
+/// Returns the facts of the self-test of a pad: its number of frames, and how far a zero may be off, in `unit`.
+pub(crate) fn rest(frames: usize, bound: Option<f64>, unit: Unit) -> Facts {
+    let mut facts: Facts = vec![("rest_frames".into(), (frames as i64).into())];
+    facts.extend(bound.map(|bound| ("tare_bound".into(), format!("{bound} {unit}").into())));
+    facts
+}

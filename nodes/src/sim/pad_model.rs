@@ -11,6 +11,8 @@ use crate::usual::{USUAL_PRESSURE_N, USUAL_THRESHOLD_N};
 
 /// Largest number of tactels of a simulated pad.
 pub const MAX_TACTELS: usize = 128 * 128;
+/// Default of the largest difference of a zero from the calibrated one: three times the usual threshold [raw].
+const TARE_BOUND: f64 = 50.0;
 /// Largest number of points of a simulated pad.
 const MAX_POINTS: f64 = 4e6;
 /// Largest latency of an image [frames].
@@ -39,6 +41,12 @@ pub struct PadModel {
     /// Noise threshold that a pad states as a fact.
     #[param(unit = "N", range = 0.0.., usual = ..=USUAL_THRESHOLD_N, default = 0.015)]
     pub threshold: f64,
+    /// Number of frames of the self-test at the start, stated as a fact; 0 for none.
+    #[param(default = pad::REST_FRAMES)]
+    rest_frames: usize,
+    /// Largest difference of a zero from that of the `calibration`, stated as a fact if there is one.
+    #[param(unit = "raw", above = 0.0, default = TARE_BOUND)]
+    tare_bound: f64,
     /// Unit of pressure that a pad states as a fact: p = 1 in the paper.
     #[param(unit = "N/tactel", above = 0.0, usual = ..=USUAL_PRESSURE_N, default = 0.1)]
     pressure: f64,
@@ -122,6 +130,8 @@ impl PadModel {
         let mut facts = pad::facts(self.threshold, self.pressure, Unit::NEWTON, calibration);
         let Electronics { common_noise, own_noise, .. } = self.electronics;
         facts.push(pad::mount(mount));
+        let bound = self.calibration.is_some().then_some(self.tare_bound);
+        facts.extend(pad::rest(self.rest_frames, bound, Unit::RAW));
         facts.extend([("common_noise".into(), common_noise.into()), ("own_noise".into(), own_noise.into())]);
         facts.push(("foam_n_per_m3".into(), self.foam.per_area().into()));
         Ok(facts)

@@ -162,6 +162,12 @@ impl NodeRig {
         self.bus.get(port)
     }
 
+    /// Returns what the node has found out so far; see [`Node::found`].
+    #[must_use]
+    pub fn found(&self) -> Option<String> {
+        self.runner.found()
+    }
+
     /// Returns the mark of an output.
     ///
     /// # Panics

@@ -106,6 +106,10 @@ pub trait AnyNode: Any + Send {
         let _ = configuration;
         false
     }
+    /// See [`Node::found`].
+    fn found(&self) -> Option<String> {
+        None
+    }
     /// See [`Node::uses`].
     fn uses(&self, wanted: &[Components]) -> Vec<Components> {
         let _ = wanted;
@@ -210,6 +214,10 @@ impl<N: Node> AnyNode for Cell<N> {
         self.parked[self.number] = Some(std::mem::replace(&mut self.active, next));
         self.number = configuration;
         true
+    }
+
+    fn found(&self) -> Option<String> {
+        self.active.node.found(&self.state)
     }
 
     fn uses(&self, wanted: &[Components]) -> Vec<Components> {

@@ -19,11 +19,14 @@ pub struct Limits {
     pub guards: Option<&'static str>,
     /// The flag that is set once a budget of the limiter is spent, so that its arm rests until the budget is refilled.
     pub spends: Option<&'static str>,
+    /// The flag that is set once the node has found that its task must not go on, such as a self-test that fails. The
+    /// task ends with a fault. Its cause is [`Node::found`](super::Node::found).
+    pub fails: Option<&'static str>,
 }
 
 impl Limits {
     /// No limit holds. Most nodes use it.
-    pub const NONE: Self = Self { through: None, holds: &[], breaks: &[], guards: None, spends: None };
+    pub const NONE: Self = Self { through: None, holds: &[], breaks: &[], guards: None, spends: None, fails: None };
 
     /// The limits of an input hold for the outputs, and no others; for example in a change of frame.
     #[must_use]

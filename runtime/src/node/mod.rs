@@ -141,6 +141,13 @@ pub trait Node: Describe + Sized + Send + 'static {
         false
     }
 
+    /// Returns what the node has found out so far, for the summary of a run and for the fault of
+    /// [`Limits::fails`]. It is called outside of the steps, so it may allocate.
+    fn found(&self, state: &Self::State) -> Option<String> {
+        let _ = state;
+        None
+    }
+
     /// Runs one step. It must not block, allocate, log or read a clock. An output that it does not write becomes
     /// absent.
     fn step(&self, tick: &Tick, inputs: Self::Inputs<'_>, out: &mut Self::Outputs, state: &mut Self::State);

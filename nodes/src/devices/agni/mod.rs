@@ -69,6 +69,13 @@ pub struct Params {
     /// Force on a tactel that is above its noise. The default is 5 % of `full_scale`, or 0.015 N with a `calibration`.
     #[param(unit = "N", range = 0.0..)]
     threshold: Option<f64>,
+    /// Number of frames of the self-test at the start, stated as a fact; 0 for none.
+    #[param(default = pad::REST_FRAMES)]
+    rest_frames: usize,
+    /// Largest difference of a zero from the calibrated one, stated as a fact. The default is three times the noise of a
+    /// reading, 0.15, or 0.0125 with a `calibration`.
+    #[param(unit = "1", above = 0.0)]
+    tare_bound: Option<f64>,
     /// Unit of pressure that the pad states as a fact: p = 1 in the paper.
     #[param(unit = "N/tactel", above = 0.0, default = 0.1)]
     pressure: f64,
@@ -98,7 +105,7 @@ pub struct Params {
 /// device` and `reconnects`. At the end of a run it stops the sensors.
 ///
 /// The unit of the stamps is not documented. With `stamp_unit_ms`, the age of a frame is computed from them. It states
-/// the facts `dead`, `threshold`, `pressure`, `calibration` and `mount`.
+/// the facts `dead`, `threshold`, `pressure`, `calibration`, `mount`, `rest_frames` and `tare_bound`.
 ///
 /// It is tested against a simulated device, and has not run on a sensor.
 ///
@@ -168,6 +175,8 @@ impl Params {
         const NOISE: f64 = 0.05;
         /// Force on a tactel that is above the noise of a calibrated pad [N].
         const THRESHOLD_N: f64 = 0.015;
+        /// Largest difference of the zero of a calibrated tactel: 50 of its 4096 steps [1].
+        const TARE_BOUND: f64 = 0.0125;
         let mut calibration = toml::Table::new();
         if let Some(file) = &self.calibration {
             calibration.insert("file".into(), arm::fact_of("calibration", file)?.into());
@@ -181,6 +190,8 @@ impl Params {
         let unit = if self.is_calibrated() { Unit::NEWTON } else { Unit::ONE };
         let mut facts = pad::facts(self.threshold.unwrap_or(default), self.pressure, unit, calibration);
         facts.push(pad::mount(&self.mount));
+        let bound = if self.calibration.is_some() { TARE_BOUND } else { 3.0 * NOISE };
+        facts.extend(pad::rest(self.rest_frames, Some(self.tare_bound.unwrap_or(bound)), Unit::ONE));
         let layout = &pad.layout;
         let shape = ImageShape { rows: layout.rows, cols: layout.cols, pitch: [self.pitch; 2], unit: Unit::ONE };
         let fill = match &pad.side {

@@ -45,6 +45,13 @@ pub struct Params {
     /// Maximum acceleration of each joint; it is not part of the protocol.
     #[param(unit = "rad/s2", above = 0.0, default = 10.0)]
     acceleration: f64,
+    /// Number of frames of the self-test at the start, stated as a fact; 0 for none.
+    #[param(default = pad::REST_FRAMES)]
+    rest_frames: usize,
+    /// Largest difference of the zero of a tactel from 0, stated as a fact; three times the threshold of the simulator if
+    /// not given.
+    #[param(unit = "raw", above = 0.0)]
+    tare_bound: Option<f64>,
 }
 
 /// A pad and an arm in another program: any simulator that speaks the lockstep protocol.
@@ -67,7 +74,7 @@ pub struct Params {
 /// before it disconnects.
 ///
 /// It states the facts `urdf`, `tip` and, if it is given, `home` of the arm, and `dead`, `threshold`, `pressure`,
-/// `calibration` and `mount` of the pad. The `contact` that a task reports is sent as `est`.
+/// `calibration`, `mount`, `rest_frames` and `tare_bound` of the pad. The `contact` that a task reports is sent as `est`.
 ///
 /// ```toml
 /// [roles]
@@ -110,7 +117,7 @@ impl Device for Lockstep {
 fn describe(hello: &Hello, params: &Params) -> Result<(Description, Output<Image>, ArmPorts), Mistakes> {
     let mut description = Description::every((hello.dt * 1e9).round() * 1e-9);
     let shape = ImageShape { rows: hello.rows, cols: hello.cols, pitch: [hello.pitch; 2], unit: Unit::RAW };
-    let image = pad::fill(description.fills(pad::ROLE), shape, pad_facts(hello));
+    let image = pad::fill(description.fills(pad::ROLE), shape, pad_facts(hello, params));
     let joints = joints(hello, params.acceleration);
     let arm = ArmPorts::fill(description.fills(arm::ROLE), &joints, model_facts(hello, params)?);
     description.on_silence(OnSilence::Holds, free::COMMAND_TIMEOUT.as_secs_f64());
@@ -132,12 +139,14 @@ fn refusal(address: &str, why: String) -> Mistakes {
     Mistake::new(Code::BadData, At::Param("address".into()), format!("the simulator at `{address}`: {why}")).into()
 }
 
-fn pad_facts(hello: &Hello) -> Facts {
+fn pad_facts(hello: &Hello, params: &Params) -> Facts {
     let gain = hello.newton_per_unit / hello.counts_per_unit;
     let calibration = toml::Table::from_iter([("gain".to_owned(), gain.into()), ("unit".to_owned(), "N".into())]);
     let [threshold, pressure] = [hello.threshold_units, 1.0].map(|units| units * hello.newton_per_unit);
     let mut facts = pad::facts(threshold, pressure, Unit::NEWTON, calibration);
     facts.push(pad::mount(&hello.mount));
+    let bound = params.tare_bound.unwrap_or(3.0 * hello.threshold_units * hello.counts_per_unit);
+    facts.extend(pad::rest(params.rest_frames, (bound > 0.0).then_some(bound), Unit::RAW));
     facts
 }
 

@@ -48,7 +48,7 @@ pub(crate) use plan::text::bytes_of;
 ///
 /// The device counts `frames`, `rejected frames`, `resyncs`, `skipped bytes`, `repeated frames`, `lost frames` (gaps of
 /// the counter), `late frames` (older than the last one), `foreign datagrams` and `reconnects`. It states the facts
-/// `dead` (no tactel is), `calibration`, and if they are given `threshold`, `pressure` and `mount`. The zero of the pad
+/// `dead` (no tactel is), `calibration`, `rest_frames`, and if they are given `threshold`, `pressure`, `tare_bound` and `mount`. The zero of the pad
 /// is that of `calibrate`: set `tare_at_start` there.
 ///
 /// ```toml
@@ -97,6 +97,7 @@ fn facts(params: &Params) -> Result<Facts, Mistakes> {
     let pressure = params.pressure.map(|pressure| format!("{pressure} {}", unit.per_tactel()));
     facts.extend(pressure.map(|pressure| ("pressure".into(), pressure.into())));
     facts.extend(params.mount.as_ref().map(pad::mount));
+    facts.extend(pad::rest(params.rest_frames, params.tare_bound, params.unit));
     Ok(facts)
 }
 

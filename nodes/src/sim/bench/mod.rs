@@ -66,7 +66,7 @@ pub struct Params {
 /// `motion`.
 ///
 /// It runs in virtual time, and the same commands and seed give the same bits; with `--realtime` it is paced by the
-/// clock. The pad states the facts `dead`, `threshold`, `pressure` and `calibration`, and the standard deviations of
+/// clock. The pad states the facts `dead`, `threshold`, `pressure`, `calibration`, `rest_frames` and `tare_bound`, and the standard deviations of
 /// its noise: `common_noise`, which all tactels share, as a fraction of the reading, and `own_noise` of each tactel in
 /// raw counts. The pad also states its `mount`. The arm states `urdf`, `tip` and `home`, which is its start if no `home` is
 /// given. In the role `ground_truth` it provides true values to

@@ -3,16 +3,22 @@
 //! The zero is part of the state, as a tare changes it: a reset restores the calibrated zero.
 
 mod curves;
+mod findings;
+mod repair;
+mod rest;
 mod tactel_curves;
 mod tare;
 
 use tactflow_runtime::node::{
-    At, Describe, FilePath, In, Inputs, Mistake, Mistakes, Node, Out, Outputs, Param, Setup, State, Tick, collect_both,
+    Absence, At, Describe, FilePath, In, Inputs, Limits, Mistake, Mistakes, Node, Out, Outputs, Param, Setup, State,
+    Tick, collect_both,
 };
-use tactflow_runtime::signal::{Flag, Image, ImageShape};
+use tactflow_runtime::signal::{Flag, Image, ImageShape, Scalar, Unit};
 use tactflow_runtime::source::Code;
 
 use curves::{CurveParams, PerTactel};
+use repair::repair;
+use rest::{Rest, RestTest, Verdict};
 use tactel_curves::TactelCurves;
 use tare::{Averages, Rules};
 
@@ -38,15 +44,33 @@ use tare::{Averages, Rules};
 /// `contact_debounce`, which reports a contact some frames late. A contact during the window, or in the frame before
 /// it, cancels the tare, and so does a single tactel that is off by more than the bound: then all old zeros stay.
 /// Between two tares nothing changes: a long contact does not become the new zero. A repeated frame counts once. When
-/// the image is absent for the graph's `reset_after_ms`, the calibrated zero is restored.
+/// the image is absent for the graph's `reset_after_ms`, the zero from before all tares is restored.
+///
+/// **Self-test.** With `rest_frames`, the first frames show whether the pad works, while nothing may touch it. Until it
+/// has passed, both images are absent, so no limiter that reads them lets anything move. A part of a task takes the
+/// number from its pad: `{ from = "pad.rest_frames", optional = true }`.
+///
+/// - A tactel is bad if its reading never changes (dead at 0, or stuck), if its noise is more than eight times the
+///   median of the pad, or if it drifts: the means of both halves of the test differ by six standard deviations. In a
+///   pad that repeats its readings in more than half of the frames, no tactel counts as bad. At most `max_bad` tactels
+///   may be bad, and none may be at a side of another.
+/// - With a `tare_bound`, the mean of each sound tactel becomes its zero. A reading that changes and whose mean is
+///   farther than the bound from the calibrated zero is a fault. If one is below, or more than half of the pad is above,
+///   the calibration does not fit the pad; otherwise something touches it.
+///
+/// A test that fails is repeated once. The second failure ends the task, and the fault names the tactels. `image` keeps
+/// the readings of bad tactels, with the zero that they had at rest: limiters read it. In `repaired`, a bad tactel is
+/// the mean of the live ones at its four sides: features read it. No tactel becomes bad after the test, so a pin that
+/// presses on one tactel for long is felt.
 ///
 /// ```toml
 /// [nodes.calibrate]
 /// type = "calibrate"
 /// in.image = "source.image"
 /// device = { from = "pad.calibration" }   # or `file = "pad.toml"`, from `tactflow calibrate`
+/// rest_frames = 40                    # the self-test; without it, the image is there at once
 /// in.present = "label.present"
-/// tare_at_start = true                # the first 50 frames are the zero, if nothing touches the pad
+/// tare_at_start = true                # the next 50 frames are the zero, if nothing touches the pad
 /// ```
 #[derive(Describe)]
 pub struct Calibrate {
@@ -55,6 +79,10 @@ pub struct Calibrate {
     curves: TactelCurves,
     /// `None` if nothing tares.
     rules: Option<Rules>,
+    /// `None` without a self-test.
+    test: Option<RestTest>,
+    /// Unit of the readings.
+    unit: Unit,
 }
 
 /// Parameters of `calibrate`.
@@ -80,12 +108,18 @@ pub struct Params {
     /// Number of frames whose mean is the new zero.
     #[param(range = 1..=1_000_000, default = 50)]
     tare_window: usize,
-    /// Largest difference between the new and the calibrated zero of a tactel; without it, any difference is accepted.
+    /// Largest difference between the new and the calibrated zero of a tactel, in a tare and in the self-test; without
+    /// it, any difference is accepted, and the self-test leaves the zeros as they are.
     #[param(unit = "U", above = 0.0)]
     tare_bound: Option<f64>,
     /// Whether to tare with the first frames.
     #[param(default = false)]
     tare_at_start: bool,
+    /// Number of frames of the self-test at the start, at least 8; 0 for none.
+    #[param(range = 0..=1_000_000, default = 0)]
+    rest_frames: usize,
+    /// Largest number of bad tactels that the self-test accepts; one in fifty if not given.
+    max_bad: Option<usize>,
 }
 
 /// What `calibrate` reads.
@@ -93,7 +127,7 @@ pub struct Params {
 pub struct Inputs<'a> {
     /// The image as measured.
     #[port(unit = "U", frame = "A", quantity = "Q")]
-    image: In<'a, Image>,
+    image: Option<In<'a, Image>>,
     /// Tares each time that it becomes set; keep it set for at least a frame of the pad.
     #[port(optional, sampled)]
     tare: Option<In<'a, Flag>>,
@@ -109,6 +143,21 @@ pub struct Outputs {
     /// The calibrated image, in `unit`.
     #[port(unit = "_", frame = "A", quantity = "Q")]
     image: Out<Image>,
+    /// The same image, with the bad tactels filled from the live ones at their sides. Limiters do not accept it.
+    #[port(unit = "_", frame = "A", quantity = "repaired_image")]
+    repaired: Out<Image>,
+    /// Whether the self-test has failed; absent before its end.
+    failed: Out<Flag>,
+    /// Number of bad tactels that the self-test has found.
+    #[port(unit = "tactel", frame = "A")]
+    bad: Out<Scalar>,
+    /// Median noise of a tactel at rest: the standard deviation of its readings, without the lowest and the highest one
+    /// of each half of the test.
+    #[port(unit = "U", frame = "A")]
+    noise: Out<Scalar>,
+    /// Largest difference between the zero at rest and the calibrated zero of a sound tactel.
+    #[port(unit = "U", frame = "A")]
+    shift: Out<Scalar>,
 }
 
 /// What `calibrate` remembers.
@@ -118,6 +167,9 @@ pub struct State {
     offset: Vec<f32>,
     /// The frames of the next zero.
     averages: Averages,
+    /// The self-test. It outlasts an absence of the image: an arm that is in contact cannot repeat it.
+    rest: Rest,
+    absence: Absence,
 }
 
 impl Node for Calibrate {
@@ -126,14 +178,18 @@ impl Node for Calibrate {
     type Outputs = Outputs;
     type State = State;
 
+    const LIMITS: Limits = Limits { fails: Some("failed"), ..Limits::NONE };
+
     fn new(params: Params, setup: &mut Setup<Self>) -> Result<Self, Mistakes> {
-        let image = setup.inputs.image.clone();
+        let image = setup.inputs.image.clone().expect("the check of a graph reports an input without a wire");
         let rules = Rules::new(&params, &setup.inputs);
+        let test = RestTest::new(params.rest_frames, params.tare_bound, params.max_bad, &image);
         let Params { offset, gain, unit, dead, file, device, .. } = params;
         let (own, device) = (CurveParams { offset, gain, unit, dead, file }, device.unwrap_or_default());
         let dead = collect_both(own.dead("", &image), device.dead("device.", &image));
         let curves = if own.has_curves() { own.curves("", &image) } else { device.curves("device.", &image) };
-        let ((rules, (dead, others)), (mut offset, mut curves, unit)) =
+        let rules = collect_both(rules, test.map_err(Mistakes::from));
+        let (((rules, test), (dead, others)), (mut offset, mut curves, unit)) =
             collect_both(collect_both(rules, dead), curves)?;
         for i in dead.into_iter().chain(others) {
             offset[i] = 0.0;
@@ -143,25 +199,68 @@ impl Node for Calibrate {
             let message = "every tactel is dead or has a gain of 0, so the calibrated image is always zero";
             return Err(Mistake::new(Code::BadValue, At::Node, message).help("check `gain` and `dead`").into());
         }
+        let readings = image.unit;
         setup.outputs.image = ImageShape { unit, ..image };
-        Ok(Self { offset, curves, rules })
+        setup.outputs.repaired = setup.outputs.image.clone();
+        Ok(Self { offset, curves, rules, test, unit: readings })
     }
 
     fn state(&self) -> State {
         let averages = self.rules.as_ref().map_or_else(Averages::default, |rules| rules.averages(self.offset.len()));
-        State { offset: self.offset.clone(), averages }
+        let rest = self.test.as_ref().map_or_else(|| Rest::passed(&self.offset), |test| test.begin(&self.offset));
+        State { offset: self.offset.clone(), averages, rest, absence: Absence::default() }
     }
 
-    fn step(&self, _: &Tick, inputs: Inputs<'_>, out: &mut Outputs, state: &mut State) {
+    fn found(&self, state: &State) -> Option<String> {
+        self.test.as_ref().map(|test| findings::describe(test, &self.unit.to_string(), &state.rest))
+    }
+
+    fn step(&self, tick: &Tick, inputs: Inputs<'_>, out: &mut Outputs, state: &mut State) {
+        out.failed.keep();
+        out.bad.keep();
+        out.noise.keep();
+        out.shift.keep();
+        let Some(image) = &inputs.image else { return state.absence.begin(tick.now) };
+        if state.absence.end(tick) {
+            state.offset.copy_from_slice(&state.rest.zeros);
+            self.rules.iter().for_each(|rules| rules.restart(&mut state.averages));
+        }
+        if state.rest.verdict != Verdict::Passed && !self.passes(image, out, state) {
+            return;
+        }
         if let Some(rules) = &self.rules {
-            rules.step(&inputs, &self.offset, &self.curves, state);
+            rules.step(image, &inputs, &self.offset, &self.curves, state);
         }
         // The loss of the command also wakes the node: without a new frame there is no new image.
-        if inputs.image.is_new() {
-            self.curves.apply(inputs.image.cells(), &state.offset, out.image.write().cells_mut());
+        if image.is_new() {
+            let forces = out.image.write().cells_mut();
+            self.curves.apply(image.cells(), &state.offset, forces);
+            let repaired = out.repaired.write().cells_mut();
+            repaired.copy_from_slice(forces);
+            repair(&state.rest.bad, repaired);
         } else {
             out.image.keep();
+            out.repaired.keep();
         }
+    }
+}
+
+impl Calibrate {
+    /// Adds a frame to the self-test, and writes what it has found once it is over. Returns whether the pad has passed.
+    #[cold]
+    fn passes(&self, image: &In<'_, Image>, out: &mut Outputs, state: &mut State) -> bool {
+        let State { rest, offset, .. } = state;
+        let Some(test) = self.test.as_ref().filter(|_| image.is_new() && rest.verdict == Verdict::Testing) else {
+            return false;
+        };
+        if test.add(image.cells(), |i| self.curves.is_dead(i), rest) {
+            out.failed.set(rest.verdict != Verdict::Passed);
+            out.bad.set(rest.bad_count as f64);
+            out.noise.set(rest.noise);
+            out.shift.set(rest.shift);
+            offset.copy_from_slice(&rest.zeros);
+        }
+        rest.verdict == Verdict::Passed
     }
 }
 

@@ -3,7 +3,8 @@
 //! `present` is known only after a frame has passed the nodes behind, so each frame of the window is checked when the
 //! next one arrives, also the last one: the zero changes with the frame after the window.
 
-use tactflow_runtime::node::{At, Mistake, Mistakes};
+use tactflow_runtime::node::{At, In, Mistake, Mistakes};
+use tactflow_runtime::signal::Image;
 use tactflow_runtime::source::Code;
 
 use super::tactel_curves::TactelCurves;
@@ -67,11 +68,24 @@ impl Rules {
         Averages { sums: vec![0.0; tactels], frames: self.is_at_start.then_some(0), was_commanded: false }
     }
 
+    /// Forgets the frames so far, and starts as at first.
+    pub(super) fn restart(&self, averages: &mut Averages) {
+        averages.sums.fill(0.0);
+        (averages.frames, averages.was_commanded) = (self.is_at_start.then_some(0), false);
+    }
+
     /// Checks the command and the last frame, and adds the new frame to the mean.
-    pub(super) fn step(&self, inputs: &Inputs<'_>, calibrated: &[f32], curves: &TactelCurves, state: &mut State) {
+    pub(super) fn step(
+        &self,
+        image: &In<'_, Image>,
+        inputs: &Inputs<'_>,
+        calibrated: &[f32],
+        curves: &TactelCurves,
+        state: &mut State,
+    ) {
         let is_commanded = inputs.tare.is_some_and(|tare| *tare);
         let averages = &mut state.averages;
-        if !inputs.image.is_new() {
+        if !image.is_new() {
             averages.was_commanded &= is_commanded;
             return;
         }
@@ -90,7 +104,7 @@ impl Rules {
         }
         // A command waits until it is known whether something touches the pad.
         averages.was_commanded = is_commanded && (averages.was_commanded || is_touched.is_some());
-        averages.add(inputs.image.cells());
+        averages.add(image.cells());
     }
 
     /// Sets the zeros to the means, unless one of them is too far from the calibrated zero.

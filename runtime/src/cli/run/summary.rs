@@ -8,7 +8,7 @@ use super::lateness::lateness;
 use super::ports::{PortTable, node_times};
 use crate::cli::text::prose::PageStyle;
 use crate::cli::view::RunView;
-use crate::engine::{Counters, End, Engine, Outcome};
+use crate::engine::{Counters, End, Engine, Outcome, TaskEnd, TaskRun};
 use crate::source::quoted;
 
 /// Maximum number of bins of a curve on the terminal: two for each character of the widest page.
@@ -82,6 +82,9 @@ impl Summary {
                 let _ = writeln!(text, "samples of `{}`: {irregular}", port.name);
             }
         }
+        for (node, found) in engine.findings().filter(|(node, _)| !is_fault(engine, outcome, node)) {
+            let _ = writeln!(text, "`{node}`: {found}");
+        }
         for (device, counts) in engine.counts().filter(|(_, counts)| !counts.is_empty()) {
             let counts: Vec<String> = counts.iter().map(|(what, count)| format!("{count} {what}")).collect();
             let _ = writeln!(text, "device `{device}`: {}", counts.join(", "));
@@ -109,6 +112,13 @@ impl Summary {
         }
         text
     }
+}
+
+/// Whether a fault of a node has ended the run or a task: then it is printed with that end.
+fn is_fault(engine: &Engine, outcome: &Outcome, node: &str) -> bool {
+    let of_run = matches!(&outcome.end, End::Fault(fault) if fault.node == node);
+    let mut tasks = engine.tasks().iter().map(TaskRun::end);
+    of_run || tasks.any(|end| matches!(end, Some(TaskEnd::Failed(fault)) if fault.node == node))
 }
 
 /// Describes the irregular samples of a port.

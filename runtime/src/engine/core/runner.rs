@@ -172,6 +172,11 @@ impl NodeRunner {
         true
     }
 
+    /// Returns what the node has found out so far.
+    pub(crate) fn found(&self) -> Option<String> {
+        self.node.found()
+    }
+
     /// Notes that the node panicked at `now` [ns]. It does not step before its reset.
     pub(crate) const fn set_panicked(&mut self, now: i64) {
         self.state = RunState::Panicked(now);

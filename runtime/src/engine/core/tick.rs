@@ -64,6 +64,11 @@ impl Core {
         self.owners.get(runner).copied().unwrap_or(0)
     }
 
+    /// Returns what each node has found out so far, in step order.
+    pub(crate) fn found(&self) -> impl Iterator<Item = Option<String>> {
+        self.runners.iter().map(NodeRunner::found)
+    }
+
     /// Starts the tick at `now` [ns].
     pub(crate) fn begin(&mut self, now: i64) {
         let dt = if self.tick.index == 0 { 0.0 } else { (now - self.tick.now) as f64 * 1e-9 };

@@ -49,6 +49,11 @@ impl Engine {
                 self.fault(name, None, Cause::SilentClock, place.to_owned())
             }
             Trouble::Late(by) => self.fault("", None, Cause::Late { by }, String::new()),
+            Trouble::Found(runner) => {
+                let (node, place) = &self.names[runner];
+                let why = self.core.found().nth(runner).flatten().unwrap_or_else(|| "it has failed".into());
+                self.fault(node, None, Cause::Found(why), place.clone())
+            }
             Trouble::Operator => self.fault("", None, Cause::Operator, String::new()),
         }
     }

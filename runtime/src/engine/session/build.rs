@@ -6,7 +6,7 @@ use super::engine::{DisplayedPort, Engine, Logged};
 use super::punctuality::Punctuality;
 use super::schedule::TickSchedule;
 use super::task_run::TaskRun;
-use super::trouble::{Origin, WatchedBudget, WatchedWire};
+use super::trouble::{Origin, WatchedBudget, WatchedFailure, WatchedWire};
 use crate::device::{Commands, Driver, Samples};
 use crate::engine::core::{
     AgedWire, CommandSlot, Core, DeviceLink, DeviceSlot, Inlet, ModeMachine, NodeRunner, ReportSlot, TaskTick, Timing,
@@ -81,6 +81,7 @@ impl Engine {
         plan.roles.iter().enumerate().for_each(|(i, role)| device_roles[role.device].push(i));
         let limits = limits(&plan.nodes, &ports);
         let budgets = budgets(&plan.nodes, &ports);
+        let failures = failures(&plan.nodes, &ports);
         let uncalibrated =
             plan.nodes.iter().filter(|node| node.is_uncalibrated).map(|node| node.name.clone()).collect();
         let mut watched = watched_commands(&plan.commands, &ports);
@@ -121,6 +122,7 @@ impl Engine {
             limits,
             uncalibrated,
             budgets,
+            failures,
             rests: Vec::new(),
             allowed: plan.allowed,
             names,
@@ -198,6 +200,15 @@ fn budgets(nodes: &[PlannedNode], ports: &BusPorts) -> Vec<WatchedBudget> {
         Some(WatchedBudget { role, runner, flag, is_spent: false })
     };
     nodes.iter().enumerate().filter_map(budget).collect()
+}
+
+/// Returns the nodes that can end their task.
+fn failures(nodes: &[PlannedNode], ports: &BusPorts) -> Vec<WatchedFailure> {
+    let failure = |(runner, node): (usize, &PlannedNode)| {
+        let flag = ports.id(PortRef { producer: Producer::Node(node.index), port: node.fails? });
+        Some(WatchedFailure { runner, flag })
+    };
+    nodes.iter().enumerate().filter_map(failure).collect()
 }
 
 /// `reports` holds the shape of each wired report, by its device and its number there.

@@ -77,6 +77,7 @@ impl Engine {
         self.raise_stale()?;
         self.run_nodes()?;
         self.watch_budgets()?;
+        self.watch_failures()?;
         for i in 0..self.watched.len() {
             let wire = &self.watched[i];
             if wire.aged.is_stale(&self.core.bus, self.core.tick.now) {
@@ -139,7 +140,7 @@ impl Engine {
 
     /// Raises a trouble of this tick for each task that it concerns, under the policy of that task. Of several, a task
     /// keeps the one with the strictest policy.
-    fn raise(
+    pub(super) fn raise(
         &mut self,
         origin: Origin,
         policy: impl Fn(&PolicyTable) -> Policy,
@@ -169,7 +170,8 @@ impl Engine {
                 self.is_mover(device) && self.has_sampled(device)
             }
             Trouble::Operator | Trouble::Lease(_) => true,
-            Trouble::Stale(_)
+            Trouble::Found(_)
+            | Trouble::Stale(_)
             | Trouble::StaleWire(_)
             | Trouble::NotFinite(_)
             | Trouble::Panicked(_)

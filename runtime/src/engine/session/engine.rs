@@ -4,7 +4,7 @@ use super::halt::{Halt, Rest};
 use super::punctuality::Punctuality;
 use super::schedule::TickSchedule;
 use super::task_run::{TaskEnd, TaskRun};
-use super::trouble::{WatchedBudget, WatchedWire};
+use super::trouble::{WatchedBudget, WatchedFailure, WatchedWire};
 use crate::device::Report;
 use crate::engine::core::{Core, Counters, DeviceLink, DeviceSlot, ModeChange, Timing};
 use crate::fault::Fault;
@@ -24,6 +24,7 @@ pub struct Engine {
     /// Name and port of the scale that each limit reports.
     pub(super) limits: Vec<(String, PortId)>,
     pub(super) budgets: Vec<WatchedBudget>,
+    pub(super) failures: Vec<WatchedFailure>,
     pub(super) rests: Vec<Rest>,
     /// Names of the limiters whose limits are in raw readings.
     pub(super) uncalibrated: Vec<String>,

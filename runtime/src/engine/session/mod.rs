@@ -8,6 +8,7 @@ mod cycle;
 mod drive;
 mod drivers;
 mod engine;
+mod failures;
 mod halt;
 mod line_reader;
 mod measure;

@@ -46,6 +46,15 @@ pub(crate) struct WatchedBudget {
     pub(crate) is_spent: bool,
 }
 
+/// A node that can end its task.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct WatchedFailure {
+    /// Index of its runner.
+    pub(crate) runner: usize,
+    /// The flag that is set once its task must not go on.
+    pub(crate) flag: PortId,
+}
+
 /// A trouble of a tick, as indices: only a trouble that halts or ends the run is described as a fault.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Trouble {
@@ -67,6 +76,8 @@ pub(crate) enum Trouble {
     Clock,
     /// The tick began late, by this time [ns].
     Late(i64),
+    /// A node has found that its task must not go on: the index of its runner.
+    Found(usize),
     /// The operator sent `stop`.
     Operator,
 }

@@ -230,6 +230,7 @@ impl Builder<'_> {
             is_logged: spec.logs,
             holds: spec.limits.holds,
             budget: spec.limits.spends.and_then(|spent| self.budget(index, spec, spent)),
+            fails: spec.limits.fails.and_then(|flag| spec.outputs.iter().position(|output| output.name == flag)),
             is_uncalibrated: built.is_uncalibrated,
             task: self.net.flat.scopes[node.scope].task,
             span: node.block.key.span.clone(),

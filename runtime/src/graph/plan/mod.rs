@@ -69,6 +69,8 @@ pub(crate) struct PlannedNode {
     pub(crate) holds: &'static [&'static str],
     /// Index of the flag that is set while a budget of the limiter is spent, and the role whose commands it limits.
     pub(crate) budget: Option<(usize, String)>,
+    /// Index of the flag that is set once the task of the node must not go on.
+    pub(crate) fails: Option<usize>,
     /// The innermost task around it.
     pub(crate) task: usize,
     /// Whether its limits are in raw readings.

@@ -4,6 +4,7 @@ use tactflow_runtime::node::{FilePath, Map, Param};
 use tactflow_runtime::signal::Unit;
 
 use crate::arm::mount::Mount;
+use crate::devices::pad;
 use crate::devices::stream::decoding::cell::{Cell, Field};
 use crate::devices::stream::decoding::clock::StampUnit;
 use crate::devices::stream::decoding::decoder::Place;
@@ -122,6 +123,13 @@ pub struct Params {
     /// Noise threshold that the pad states as a fact; in N with a `calibration`.
     #[param(unit = "$unit", range = 0.0..)]
     pub(crate) threshold: Option<f64>,
+    /// Number of frames of the self-test at the start, stated as a fact; 0 for none.
+    #[param(default = pad::REST_FRAMES)]
+    pub(crate) rest_frames: usize,
+    /// Largest difference of a zero from the calibrated one, stated as a fact. Without it, the self-test does not compare
+    /// the zeros.
+    #[param(unit = "$unit", above = 0.0)]
+    pub(crate) tare_bound: Option<f64>,
     /// Unit of pressure that the pad states as a fact, per tactel: p = 1 in the paper; in N with a `calibration`.
     #[param(unit = "$unit", above = 0.0)]
     pub(crate) pressure: Option<f64>,
