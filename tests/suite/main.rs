@@ -99,3 +99,4 @@ mod view;
 mod warnings;
 mod windows;
 mod words;
+mod wrench;
