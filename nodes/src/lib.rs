@@ -66,6 +66,7 @@ fn edge() -> Catalogue {
         .device::<devices::mock_pad::MockPad>()
         .device::<devices::recording::Player>()
         .device::<devices::mock_arm::MockArm>()
+        .device::<devices::mock_force::MockForce>()
         .device::<sim::bench::SimBench>()
         .device::<sim::pair::SimPair>()
         .device::<devices::lockstep::Lockstep>();

@@ -3,7 +3,7 @@
 use tactflow_runtime::catalogue::Catalogue;
 use toml::{Table, Value};
 
-/// A graph of all examples at once, on the scripted pad and arm.
+/// A graph of all examples at once, on the scripted devices.
 ///
 /// # Panics
 /// If an example is no TOML, or if two of them say different things.
@@ -15,7 +15,8 @@ pub fn graph_of_all(catalogue: &Catalogue) -> String {
         let example: Table = example.parse().unwrap_or_else(|error| panic!("the example of `{name}`: {error}"));
         lay(&mut graph, example, &name);
     }
-    for device in catalogue.devices().iter().filter(|device| ["mock_pad", "mock_arm"].contains(&&*device.name())) {
+    let mocks = catalogue.devices().iter().filter(|device| device.name().starts_with("mock_"));
+    for device in mocks {
         lay(&mut graph, device.example().parse().expect("it is TOML"), &device.name());
     }
     toml::to_string(&graph).expect("what was read can be written")

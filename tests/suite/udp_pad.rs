@@ -109,8 +109,25 @@ const SETPOINT: &str = "nodes.error.setpoint.pressure=0.1";
 
 #[test]
 fn a_pad_that_goes_silent_holds_the_arm_until_it_is_back() {
+    holds_until_it_is_back("policy.device='hold'");
+}
+
+#[test]
+fn so_does_a_pad_that_the_bench_lets_come_back() {
+    holds_until_it_is_back("devices.skin.reconnect=true");
+}
+
+#[test]
+fn a_device_that_runs_with_the_graph_cannot_come_back() {
+    let request = Request::file(workspace().join("graphs/force.toml")).set("devices.bench.reconnect=true");
+    let report = compile(&catalogue(), &request).err().expect("it is refused").render(false);
+    assert!(report.contains("`bench` runs with the graph, so it cannot be lost and come back"), "{report}");
+}
+
+/// Lets a pad go silent and come back, in a task with the setting `set`.
+fn holds_until_it_is_back(set: &str) {
     let pad = pad(vec![Act::Frames(30), Act::Silence, Act::FramesToTheEnd]);
-    let request = Request::file(workspace().join("graphs/force.toml")).set("policy.device='hold'").set(SETPOINT);
+    let request = Request::file(workspace().join("graphs/force.toml")).set(set).set(SETPOINT);
     let request = Request { bench_text: Some(bench(pad.address)), ..request };
     let compiled = compile(&catalogue(), &request).unwrap_or_else(|report| panic!("{}", report.render(false)));
     let mut engine = Engine::new(compiled);

@@ -11,6 +11,7 @@ pub mod lockstep;
 #[cfg(feature = "drivers")]
 pub mod lwr_fri;
 pub mod mock_arm;
+pub mod mock_force;
 pub mod mock_pad;
 pub(crate) mod pad;
 pub mod recording;

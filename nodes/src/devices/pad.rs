@@ -43,3 +43,16 @@ pub(crate) fn rest(frames: usize, bound: Option<f64>, unit: Unit) -> Facts {
     facts.extend(bound.map(|bound| ("tare_bound".into(), format!("{bound} {unit}").into())));
     facts
 }
+
+/// Fraction of the full scale of all tactels by which their sum can change from frame to frame [1]. Garbage changes it by
+/// more. So does a blow, which then costs one frame.
+const MAX_RISE: f64 = 0.125;
+
+/// Returns the facts of what a frame of a pad with so many tactels can be: the largest reading, in `unit`, and the
+/// largest change of the sum.
+pub(crate) fn frames(max_reading: f64, tactels: usize, unit: Unit) -> Facts {
+    let max_rise = MAX_RISE * max_reading * tactels as f64;
+    [("max_reading", max_reading), ("max_rise", max_rise)]
+        .map(|(name, value)| (name.into(), format!("{value} {unit}").into()))
+        .into()
+}

@@ -4,7 +4,7 @@ use tactflow_runtime::node::{FilePath, Mistake, Mistakes, Param};
 use tactflow_runtime::signal::{ImageShape, Unit};
 
 use super::foam::Foam;
-use super::readout::Electronics;
+use super::readout::{Electronics, MAX_COUNT};
 use crate::arm::mount::Mount;
 use crate::devices::{Facts, arm, pad};
 use crate::usual::{USUAL_PRESSURE_N, USUAL_THRESHOLD_N};
@@ -132,6 +132,7 @@ impl PadModel {
         facts.push(pad::mount(mount));
         let bound = self.calibration.is_some().then_some(self.tare_bound);
         facts.extend(pad::rest(self.rest_frames, bound, Unit::RAW));
+        facts.extend(pad::frames(MAX_COUNT, self.tactels(), Unit::RAW));
         facts.extend([("common_noise".into(), common_noise.into()), ("own_noise".into(), own_noise.into())]);
         facts.push(("foam_n_per_m3".into(), self.foam.per_area().into()));
         Ok(facts)

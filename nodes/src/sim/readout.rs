@@ -43,7 +43,7 @@ pub struct Electronics {
 }
 
 /// Largest count of 12 bits.
-const MAX_COUNT: f64 = 4095.0;
+pub(super) const MAX_COUNT: f64 = 4095.0;
 /// Change of the force over which the hysteresis switches its branch [N].
 const HYSTERESIS_FORCE: f64 = 0.15;
 

@@ -40,6 +40,8 @@ pub struct Description {
     /// Whether it moves something real: a run uses a tenth of its limits until somebody has proven, with the command
     /// that commissions a bench, that it stops by itself.
     pub needs_commissioning: bool,
+    /// Whether the bench lets the device come back after it was lost.
+    pub(crate) may_return: bool,
     pub(crate) fills: Vec<Filled>,
     pub(crate) outputs: Vec<StatedPort>,
     pub(crate) commands: Vec<StatedPort>,

@@ -19,6 +19,11 @@ pub(super) fn describe(test: &RestTest, unit: &str, rest: &Rest) -> String {
             let bad = if count == 0 { "no bad tactel".to_owned() } else { format!("{count} bad: {}", bad()) };
             format!("self-test: noise {noise:.4} {unit}, zeros off by at most {shift:.4} {unit}, {bad}")
         }
+        Verdict::Stuck => {
+            "the pad repeats its image bit for bit in new frames, although it had noise in the self-test: \
+             it is stuck; start the sensor again"
+                .to_owned()
+        }
         Verdict::TooManyBad => {
             let count = rest.bad_count;
             format!(

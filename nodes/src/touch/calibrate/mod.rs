@@ -4,6 +4,7 @@
 
 mod curves;
 mod findings;
+mod frames;
 mod repair;
 mod rest;
 mod tactel_curves;
@@ -17,6 +18,7 @@ use tactflow_runtime::signal::{Flag, Image, ImageShape, Scalar, Unit};
 use tactflow_runtime::source::Code;
 
 use curves::{CurveParams, PerTactel};
+use frames::{Frame, FrameRules, Frames};
 use repair::repair;
 use rest::{Rest, RestTest, Verdict};
 use tactel_curves::TactelCurves;
@@ -37,6 +39,13 @@ use tare::{Averages, Rules};
 /// With `device = { from = "pad.calibration" }` a task takes all of that from the device of the pad, so it works with
 /// any pad. If any of `offset`, `gain`, `unit` and `file` is set beside `device`, it replaces all four of the device.
 /// Dead tactels add up.
+///
+/// **Frames.** With `in.sum` and `in.peak`, wired to the `tactile_source` of the image, frames that are no measurement
+/// are dropped before any mean, and both images are absent for that time: nothing moves into the object. A frame with a
+/// reading above `max_reading` is dropped, and one whose sum changes by more than `max_rise`. The frame after that one
+/// counts, so that an impact costs one frame. A pad whose self-test saw noise never sends one image three times in a
+/// row: then the images are absent, and after 25 such frames the task ends with a fault. A pad that repeats its readings
+/// at rest may repeat them.
 ///
 /// **Tare.** The zero of foam drifts. When `in.tare` becomes set, the mean of the next `tare_window` frames becomes the
 /// zero of each tactel; with `tare_at_start` the mean of the first frames does. A pad is only tared while nothing
@@ -81,6 +90,8 @@ pub struct Calibrate {
     rules: Option<Rules>,
     /// `None` without a self-test.
     test: Option<RestTest>,
+    /// `None` without the sum and the peak of the readings.
+    frames: Option<FrameRules>,
     /// Unit of the readings.
     unit: Unit,
 }
@@ -120,6 +131,13 @@ pub struct Params {
     rest_frames: usize,
     /// Largest number of bad tactels that the self-test accepts; one in fifty if not given.
     max_bad: Option<usize>,
+    /// Largest possible reading; a frame with a greater one is dropped.
+    #[param(unit = "U")]
+    max_reading: Option<f64>,
+    /// Largest possible change of the sum from frame to frame; a frame that changes by more is dropped, and the next one
+    /// counts.
+    #[param(unit = "U", above = 0.0)]
+    max_rise: Option<f64>,
 }
 
 /// What `calibrate` reads.
@@ -135,6 +153,12 @@ pub struct Inputs<'a> {
     /// tare.
     #[port(quantity = "contact", optional, delayed)]
     present: Option<In<'a, Flag>>,
+    /// Sum of the readings: `sum` of the `tactile_source` of the image.
+    #[port(unit = "U", frame = "A", quantity = "sum", optional, sampled)]
+    sum: Option<In<'a, Scalar>>,
+    /// Largest reading: `peak` of the `tactile_source` of the image.
+    #[port(unit = "U", frame = "A", quantity = "peak", optional, sampled)]
+    peak: Option<In<'a, Scalar>>,
 }
 
 /// What `calibrate` writes.
@@ -169,6 +193,8 @@ pub struct State {
     averages: Averages,
     /// The self-test. It outlasts an absence of the image: an arm that is in contact cannot repeat it.
     rest: Rest,
+    /// What was seen of the frames.
+    frames: Frames,
     absence: Absence,
 }
 
@@ -184,12 +210,14 @@ impl Node for Calibrate {
         let image = setup.inputs.image.clone().expect("the check of a graph reports an input without a wire");
         let rules = Rules::new(&params, &setup.inputs);
         let test = RestTest::new(params.rest_frames, params.tare_bound, params.max_bad, &image);
+        let frames = FrameRules::new(&params, &setup.inputs);
         let Params { offset, gain, unit, dead, file, device, .. } = params;
         let (own, device) = (CurveParams { offset, gain, unit, dead, file }, device.unwrap_or_default());
         let dead = collect_both(own.dead("", &image), device.dead("device.", &image));
         let curves = if own.has_curves() { own.curves("", &image) } else { device.curves("device.", &image) };
-        let rules = collect_both(rules, test.map_err(Mistakes::from));
-        let (((rules, test), (dead, others)), (mut offset, mut curves, unit)) =
+        let tests = collect_both(test.map_err(Mistakes::from), frames.map_err(Mistakes::from));
+        let rules = collect_both(rules, tests);
+        let (((rules, (test, frames)), (dead, others)), (mut offset, mut curves, unit)) =
             collect_both(collect_both(rules, dead), curves)?;
         for i in dead.into_iter().chain(others) {
             offset[i] = 0.0;
@@ -202,17 +230,19 @@ impl Node for Calibrate {
         let readings = image.unit;
         setup.outputs.image = ImageShape { unit, ..image };
         setup.outputs.repaired = setup.outputs.image.clone();
-        Ok(Self { offset, curves, rules, test, unit: readings })
+        Ok(Self { offset, curves, rules, test, frames, unit: readings })
     }
 
     fn state(&self) -> State {
         let averages = self.rules.as_ref().map_or_else(Averages::default, |rules| rules.averages(self.offset.len()));
         let rest = self.test.as_ref().map_or_else(|| Rest::passed(&self.offset), |test| test.begin(&self.offset));
-        State { offset: self.offset.clone(), averages, rest, absence: Absence::default() }
+        State { offset: self.offset.clone(), averages, rest, frames: Frames::default(), absence: Absence::default() }
     }
 
     fn found(&self, state: &State) -> Option<String> {
-        self.test.as_ref().map(|test| findings::describe(test, &self.unit.to_string(), &state.rest))
+        let test = self.test.as_ref().map(|test| findings::describe(test, &self.unit.to_string(), &state.rest));
+        let dropped = (state.frames.dropped > 0).then(|| format!("{} frames dropped as garbage", state.frames.dropped));
+        test.into_iter().chain(dropped).reduce(|test, dropped| format!("{test}; {dropped}"))
     }
 
     fn step(&self, tick: &Tick, inputs: Inputs<'_>, out: &mut Outputs, state: &mut State) {
@@ -225,7 +255,15 @@ impl Node for Calibrate {
             state.offset.copy_from_slice(&state.rest.zeros);
             self.rules.iter().for_each(|rules| rules.restart(&mut state.averages));
         }
-        if state.rest.verdict != Verdict::Passed && !self.passes(image, out, state) {
+        let frame = match &self.frames {
+            Some(rules) if image.is_new() => rules.judge(&inputs, state.rest.has_noise, &mut state.frames),
+            _ => Frame::Good,
+        };
+        if frame == Frame::Stuck && state.rest.verdict == Verdict::Passed {
+            state.rest.verdict = Verdict::Stuck;
+            out.failed.set(true);
+        }
+        if frame != Frame::Good || state.rest.verdict != Verdict::Passed && !self.passes(image, out, state) {
             return;
         }
         if let Some(rules) = &self.rules {

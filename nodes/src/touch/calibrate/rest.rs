@@ -33,6 +33,8 @@ pub(super) enum Verdict {
     Adjacent([usize; 2]),
     /// The calibration is not that of the pad: so many tactels are beyond the bound, and one is the farthest.
     Unfit { count: usize, worst: (usize, f64) },
+    /// The pad has passed, and later repeats its image.
+    Stuck,
     /// Something touches the pad: so many tactels are above the bound, and one is the farthest.
     Touched { count: usize, worst: (usize, f64) },
 }
@@ -63,6 +65,8 @@ pub(super) struct Rest {
     pub(super) noise: f64,
     /// Largest difference between a zero and the calibrated one [unit of the input].
     pub(super) shift: f64,
+    /// Whether sound tactels change in most frames.
+    pub(super) has_noise: bool,
     /// Number of frames so far.
     pub(super) frames: usize,
     /// Whether these are the frames of the second test, after a first one that failed.
@@ -203,7 +207,7 @@ impl RestTest {
         sorted.extend(live().map(|i| f64::from(rest.tactels[i].changes)));
         // In a pad that mostly repeats its readings, a tactel that repeats them may be sound.
         let is_telling = 2.0 * median(&mut sorted) >= self.frames as f64;
-        rest.sorted = sorted;
+        (rest.sorted, rest.has_noise) = (sorted, is_telling);
         (rest.noise, rest.shift, rest.bad_count) = (noise, 0.0, 0);
         rest.bad.clear();
         let (mut above, mut below, mut live_count, mut worst) = (0, 0, 0, (0, 0.0_f64));

@@ -44,7 +44,12 @@ impl Engine {
             let inlet = &self.core.inlets[i];
             let device = &self.devices[inlet.device];
             if device.failed.is_none() && inlet.lost(&device.samples).is_some() {
-                self.raise(Origin::Role(inlet.role), |policy| policy.device.0, Trouble::Lost(i))?;
+                let may_return = device.description.may_return;
+                let policy = |policy: &PolicyTable| match policy.device.0 {
+                    Policy::Fault if may_return => Policy::Hold,
+                    policy => policy,
+                };
+                self.raise(Origin::Role(inlet.role), policy, Trouble::Lost(i))?;
             }
         }
         self.schedule.ticked(now, has_sampled);

@@ -5,6 +5,7 @@ mod commissioning;
 mod facts;
 mod models;
 mod open;
+mod reconnect;
 mod sides;
 
 pub use all::{BenchDevice, OpenBench, open_bench};

@@ -4,6 +4,7 @@ use std::borrow::Cow;
 use std::collections::{BTreeMap, BTreeSet};
 use std::ops::Range;
 
+use super::reconnect::allow_return;
 use super::sides;
 use crate::catalogue::Catalogue;
 use crate::device::{Description, StatedPort};
@@ -376,6 +377,7 @@ impl<'a> Opener<'a> {
         if !self.check_ports(&mut description, block) {
             return None;
         }
+        self.diagnostics.extend(allow_return(block, &driver, &mut description));
         description.slow_down(self.slow);
         let (name, span) = (word.value.clone(), block.key.span.clone());
         self.opened.devices.push(PlannedDevice { name, driver, description, span });

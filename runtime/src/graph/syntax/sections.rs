@@ -116,6 +116,8 @@ pub(crate) struct Block {
     pub(crate) params: Value,
     /// The role without which the node is left out.
     pub(crate) only_with: Option<Spanned<String>>,
+    /// Whether a device may come back after it was lost, and the place that says so.
+    pub(crate) reconnect: Option<Spanned<bool>>,
 }
 
 /// The block of a part: its file, the wires into it, and its overrides.
@@ -271,7 +273,8 @@ impl<'a> Sections<'a> {
                 let file = table.remove(what).and_then(|(_, value)| FilePath::read(&value, &mut self.reader));
                 model_files.extend(file.map(|file| ModelFile { device: key.clone(), what, file }));
             }
-            self.block(key, table, &names)
+            let reconnect = table.remove("reconnect").and_then(|(_, value)| Spanned::read(&value, &mut self.reader));
+            Block { reconnect, ..self.block(key, table, &names) }
         };
         let devices = devices.into_iter().map(block).collect();
         let section = root.entry("bind");
@@ -347,7 +350,7 @@ impl<'a> Sections<'a> {
         };
         // A missing parameter is reported at the name of the block.
         let params = Value { span: key.span.clone(), item: Item::Table(table) };
-        Block { key, kind, wires: InputWires::default(), params, only_with: None }
+        Block { key, kind, wires: InputWires::default(), params, only_with: None, reconnect: None }
     }
 
     fn part_block(&mut self, key: Key, mut table: Table, sources: &[String]) -> PartBlock {
@@ -409,8 +412,7 @@ impl<'a> Sections<'a> {
 
     /// Reads the section [bind].
     fn bindings(&mut self, value: Option<&Value>) -> Named<Binding> {
-        let words = self.words(value);
-        words.iter().map(|(key, word)| (key.clone(), Binding { word: word.clone() })).collect()
+        self.words(value).iter().map(|(key, word)| (key.clone(), Binding { word: word.clone() })).collect()
     }
 
     /// Reads a table whose values are wires, each a port or a table with an age limit.
