@@ -42,12 +42,12 @@ pub fn example_graph(catalogue: &Catalogue, name: &str) -> Result<String, String
     let start = parts.iter().position(|part| part.kind == name).ok_or_else(|| format!("`{name}` has no example"))?;
     let chosen: Vec<&ExamplePart> = chosen(&parts, start)?.into_iter().map(|index| &parts[index]).collect();
     let target = &parts[start];
-    let used = match target.is_device || !is_unused(&chosen, target) {
-        true => None,
-        false => insert_into_wire(catalogue, &chosen, target)
-            .or_else(|| append_log(catalogue, &chosen, target))
-            .or_else(|| show_output(catalogue, &chosen, target)),
-    };
+    let node = if target.is_device { reader(&parts, start).map(|index| &parts[index]) } else { Some(target) };
+    let used = node.filter(|node| is_unused(&chosen, node)).and_then(|node| {
+        insert_into_wire(catalogue, &chosen, node)
+            .or_else(|| append_log(catalogue, &chosen, node))
+            .or_else(|| show_output(catalogue, &chosen, node))
+    });
     Ok(used.unwrap_or_else(|| text(&chosen, target, None)))
 }
 
@@ -55,10 +55,8 @@ pub fn example_graph(catalogue: &Catalogue, name: &str) -> Result<String, String
 fn chosen(parts: &[ExamplePart], start: usize) -> Result<Vec<usize>, String> {
     let mut chosen = vec![start];
     if parts[start].is_device {
-        // A sensor alone does nothing, so the first node that reads it is added.
-        let reads =
-            |part: &ExamplePart| !part.is_device && part.needs.iter().any(|need| parts[start].names.contains(need));
-        chosen.extend(parts.iter().position(reads));
+        // A sensor alone does nothing.
+        chosen.extend(reader(parts, start));
     }
     let mut at = 0;
     while let Some(part) = chosen.get(at).map(|index| &parts[*index]) {
@@ -76,6 +74,12 @@ fn chosen(parts: &[ExamplePart], start: usize) -> Result<Vec<usize>, String> {
     }
     chosen.sort_unstable();
     Ok(chosen)
+}
+
+/// Returns the first node that reads a device.
+fn reader(parts: &[ExamplePart], device: usize) -> Option<usize> {
+    let reads = |part: &ExamplePart| part.needs.iter().any(|need| parts[device].names.contains(need));
+    parts.iter().position(|part| !part.is_device && reads(part))
 }
 
 /// Whether the graph drives a command and nothing reads the target.
