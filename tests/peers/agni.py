@@ -172,8 +172,6 @@ class Device:
             self.is_silent = words[0] == "silence"
         elif words[0] == "unplug":
             self.unplug()
-        elif words[0] == "serial":
-            self.options.serial = words[1]
         elif words[0] == "replug":
             self.plug()
         elif words[0] == "ask":

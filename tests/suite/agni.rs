@@ -165,22 +165,6 @@ fn a_sensor_that_is_unplugged_is_lost_and_starts_again() {
 }
 
 #[test]
-fn another_sensor_on_the_same_port_is_refused() {
-    let mut sensor = Sensor::start(&["--serial", "B012"]);
-    let mut rig = sensor.rig("silence_ms = 2000");
-    images(&mut rig, 5);
-    sensor.order("unplug");
-    assert!(rig.wait_until(SOON, |rig| rig.lost("image").is_some()));
-    sensor.order("serial B013");
-    sensor.order("replug");
-    assert!(rig.wait_until(SOON, |rig| rig.lost("image").is_some_and(|why| why.contains("B013"))));
-    assert_eq!(rig.get::<Image>("image"), None);
-    let error = rig.stop().unwrap_err();
-    let why = "another device is connected: its serial number is `B013`, and it was `B012`";
-    assert!(error.0.contains(why), "{error}");
-}
-
-#[test]
 fn a_silent_sensor_is_lost_and_greeted_again() {
     let mut sensor = Sensor::start(&[]);
     let mut rig = sensor.rig("silence_ms = 300");

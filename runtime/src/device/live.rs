@@ -50,8 +50,6 @@ pub struct Link {
     cycle: Duration,
     latency: i64,
     name: String,
-    /// Serial number of the device that was connected first.
-    serial: Option<String>,
 }
 
 impl Link {
@@ -92,19 +90,6 @@ impl Link {
         self.hand_over(write);
         self.published.store(self.staging.writes, Ordering::Release);
         self.tick.unpark();
-    }
-
-    /// States the serial number of the device that is connected. Call it after each connection to a device that has one.
-    ///
-    /// # Errors
-    /// If another one was connected before. Return this error from [`Live::run`]: what the graph knows of the device does
-    /// not hold for another one.
-    pub fn identify(&mut self, serial: &str) -> Result<(), DeviceError> {
-        if self.serial.get_or_insert_with(|| serial.to_owned()) == serial {
-            return Ok(());
-        }
-        let known = self.serial.as_deref().unwrap_or_default();
-        Err(DeviceError(format!("another device is connected: its serial number is `{serial}`, and it was `{known}`")))
     }
 
     /// Makes a port absent until it is written again; see [`Samples::lost`]. The driver goes on, to reconnect for
@@ -272,7 +257,6 @@ pub(crate) fn start(name: &str, driver: Box<dyn Live>, setup: LinkSetup<'_>) -> 
         lease,
         clock: DeviceClock::new(period.as_nanos() as i64),
         name: name.to_owned(),
-        serial: None,
         published: Arc::clone(&published),
         commanded: Arc::clone(&commanded),
         stop: stopping,

@@ -68,7 +68,7 @@ impl StampClock {
 enum Ended {
     /// The port is gone or the device is silent: try again.
     Lost(String),
-    /// The device is another one than the bench says, or than before.
+    /// The device is another one than the bench says.
     Wrong(String),
 }
 
@@ -140,9 +140,6 @@ impl Agni {
         let port = Connection::open(&self.address, BAUD, None).await?;
         let session = self.session.insert(Session::new(port));
         let Identity { config, serial } = session.greet().await?;
-        if let Some(serial) = &serial {
-            link.identify(serial).map_err(|error| Ended::Wrong(error.0))?;
-        }
         self.serial = serial;
         let pads: Vec<Pad> = self.pads.iter().map(|port| port.pad.clone()).collect();
         let served = assign(&pads, &config).map_err(Ended::Wrong)?;
