@@ -16,8 +16,8 @@ const DEFAULT_THRESHOLD: f64 = 0.01;
 const STIFFENING: f64 = 8.0;
 /// Largest approach toward what presses on an image of raw readings, if it is not given [m/s].
 const DEFAULT_RAW_APPROACH: f64 = 0.01;
-/// Time in which a load that falls is believed [s]. A rise is believed at once: a pad whose noise dips below the ceiling
-/// would otherwise press harder with each dip.
+/// Time constant of a load that falls [s]. A rise is believed at once: a pad whose noise dips below the ceiling would
+/// otherwise press harder with each dip.
 const FALL_S: f64 = 0.1;
 
 /// Reads the load of a pad, and compares it with its ceilings.
@@ -35,7 +35,7 @@ pub(in crate::limits) struct Gauge {
     threshold: f64,
     /// Compliance of the joints of a compliant arm [rad/(N m)].
     joints: Option<f64>,
-    /// Part of a fall of the load that an image is believed [1].
+    /// Fraction of a fall of the load that counts with each image [1].
     fall: f64,
 }
 
@@ -137,9 +137,7 @@ impl Gauge {
         if image.is_new() || reading.stamp != Some(stamp) {
             reading.stamp = Some(stamp);
             reading.load = load(image);
-            let PadLoad { sum, peak } = reading.held;
-            let held = |old: f64, new: f64| if new < old { old + (new - old) * self.fall } else { new };
-            reading.held = PadLoad { sum: held(sum, reading.load.sum), peak: held(peak, reading.load.peak) };
+            reading.held = reading.load.held(reading.held, self.fall);
         }
         let delay = stamp.age(tick.now) as f64 * 1e-9 + 2.0 * self.period.max(tick.dt);
         let PadLoad { sum, peak } = reading.load;
