@@ -16,6 +16,7 @@ mod cell;
 mod cli;
 mod clocks;
 
+mod control_law;
 mod course;
 mod crossings;
 mod determinism;
