@@ -1,7 +1,7 @@
 //! Each fault on the frames of a device whose values are known.
 
 use super::device::Spoilt;
-use super::resolve::Injection;
+use super::resolve::{Injection, Target};
 use super::table::{InjectBlock, blocks};
 use crate::device::{Commands, Description, DeviceError, Output, Samples, Stepped};
 use crate::node::Reader;
@@ -48,7 +48,7 @@ fn run(text: &str, seed: u64) -> (Vec<Arrived>, u64) {
     assert_eq!(mistakes, [""; 0], "{text}");
     let injection = |block: InjectBlock| {
         let table = block.table.expect("no mistake");
-        Injection { device: 0, port: 0, shape: SHAPE, table }
+        Injection { device: 0, target: Target::Image(0, SHAPE), table }
     };
     let injections: Vec<Injection> = blocks.into_iter().map(injection).collect();
     let numbered: Vec<(usize, &Injection)> = injections.iter().enumerate().collect();
