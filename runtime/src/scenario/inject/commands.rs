@@ -4,7 +4,6 @@ use std::collections::VecDeque;
 
 use super::fault::Fault;
 use super::table::FaultKind;
-use crate::device::Commands;
 
 /// A command with faults.
 pub(super) struct SpoiltCommand {

@@ -15,7 +15,7 @@ mod table;
 
 pub(super) use device::inject;
 pub(super) use resolve::{Injection, resolve};
-pub(super) use table::{Cells, FaultKind, InjectBlock, InjectTable, Spoils, blocks};
+pub(super) use table::{InjectBlock, InjectTable, blocks};
 
 #[cfg(test)]
 mod tests;
