@@ -88,7 +88,7 @@ fn row(cell: &Cell, has_colour: bool) -> [String; 9] {
     let (same, changes) = cell.margin().map_or((String::new(), None), |(same, changes)| (of(same), changes));
     let change = cell.attacks.last().map_or("", |attack| attack.fate.name());
     [
-        cell.fault.to_owned(),
+        cell.fault.clone(),
         cell.phase.name().to_owned(),
         expected.join(" or "),
         cell.not_run.clone().unwrap_or_else(|| first.map_or("", |attack: &Attack| attack.fate.name()).to_owned()),

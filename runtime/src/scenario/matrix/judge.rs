@@ -72,8 +72,7 @@ pub(super) fn judge(scene: &Scene, strike: Strike<'_>, [reference, run]: [&Run; 
             broken.push(format!("the force on `{}` is {:.1} N, more than {bound:.1} N", side.pad, forces(i)));
         }
         broken.extend(motion(side, i, before, after));
-        let late = if matches!(row.fault, "late" | "jitter") { severity * 1e-3 } else { 0.0 };
-        broken.extend(push_after_loss(side, i, &run.moments, [at, SEEN_S + late]));
+        broken.extend(push_after_loss(side, i, &run.moments, [at, SEEN_S + row.delay(severity)]));
     }
     broken.extend(jerks(scene, before, after));
     let halt = halt.map(|(time, _)| *time).filter(|_| run.fault.is_none());

@@ -46,7 +46,7 @@ pub struct Matrix {
 #[derive(Debug, Clone, Serialize)]
 pub struct Cell {
     /// Name of the fault.
-    pub fault: &'static str,
+    pub fault: String,
     /// The phase in which it strikes.
     pub phase: Phase,
     /// When it strikes [s].
@@ -54,7 +54,7 @@ pub struct Cell {
     /// What may come of the smallest severity.
     pub expected: Vec<Fate>,
     /// What the severity is.
-    pub unit: &'static str,
+    pub unit: String,
     /// The runs, from the smallest severity on.
     pub attacks: Vec<Attack>,
     /// Why there is none.
@@ -135,7 +135,7 @@ impl Matrix {
     /// # Errors
     /// If there is no fault with a name.
     pub fn cells(&self, only: &[String]) -> Result<Vec<(usize, Phase)>, String> {
-        let names = || ROWS.iter().map(|row| row.name);
+        let names = || ROWS.iter().map(|row| row.name.as_str());
         if let Some(name) = only.iter().find(|name| !names().any(|known| known == **name)) {
             return Err(format!("there is no fault `{name}`: the faults are {}", quoted(names())));
         }
@@ -155,10 +155,10 @@ impl Matrix {
     ) -> Option<Cell> {
         let row = &ROWS[number];
         let (at_s, expected) = (self.phases[phase as usize], row.expected(phase));
-        let mut cell =
-            Cell { fault: row.name, phase, at_s, expected, unit: row.unit, attacks: Vec::new(), not_run: None };
+        let (fault, unit) = (row.name.clone(), row.unit.clone());
+        let mut cell = Cell { fault, phase, at_s, expected, unit, attacks: Vec::new(), not_run: None };
         let at = at_s?;
-        for severity in row.severities {
+        for severity in &row.severities {
             let strike = Strike { row, severity: *severity, phase, at };
             match self.strike(catalogue, strike, is_interrupted) {
                 Ok(attack) => cell.attacks.push(attack?),
@@ -205,7 +205,7 @@ impl Matrix {
         if role.is_empty() {
             return Err("the task commands no arm".to_owned());
         }
-        let entry = row.entry(severity, role, at, self.reference.largest, &joints, side.cells);
+        let entry = row.entry(severity, [role, &format!("{at:.3}")], self.reference.largest, &joints, side.cells);
         let mut compiled =
             compile(catalogue, &self.request).map_err(|_| "the task does not load any more".to_owned())?;
         let mut found = Vec::new();

@@ -1,28 +1,34 @@
-//! The table of the fault matrix: what strikes, how hard, and what must come of it. It is written before any run, and
-//! nothing in it is measured.
+//! The table of the fault matrix, from the file `table.toml`.
 
-use serde::Serialize;
+use std::sync::LazyLock;
+
+use serde::{Deserialize, Serialize};
 
 /// A phase of a run in which a fault strikes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
-#[serde(rename_all = "snake_case")]
 pub enum Phase {
     /// Half-way from the first motion to the first contact.
+    #[serde(rename = "approach")]
     Approach,
     /// 0.1 s after the first contact.
+    #[serde(rename = "first touch")]
     FirstTouch,
     /// In contact, with the sensor slower than 2 mm/s.
+    #[serde(rename = "steady")]
     Steady,
     /// In contact, with the sensor faster than 3 mm/s along the pad.
+    #[serde(rename = "sliding")]
     Sliding,
     /// While a limiter reduces the motion.
+    #[serde(rename = "at a limit")]
     AtALimit,
     /// From the tick in which the operator sends `stop`.
+    #[serde(rename = "ramping")]
     Ramping,
 }
 
 impl Phase {
-    /// Returns all phases.
+    /// All phases.
     pub const ALL: [Self; 6] =
         [Self::Approach, Self::FirstTouch, Self::Steady, Self::Sliding, Self::AtALimit, Self::Ramping];
 
@@ -34,16 +40,19 @@ impl Phase {
 }
 
 /// What has come of a run with a fault.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
-#[serde(rename_all = "snake_case")]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Fate {
     /// The task goes on.
+    #[serde(rename = "holds")]
     Holds,
     /// The pad is without the contact that it has in the run without the fault.
+    #[serde(rename = "loses contact")]
     Loses,
     /// The commands are held at zero, and the cause is named.
+    #[serde(rename = "halts")]
     Halts,
     /// The run has ended with a named fault.
+    #[serde(rename = "fails")]
     Fails,
 }
 
@@ -55,27 +64,10 @@ impl Fate {
     }
 }
 
-/// What the severity of a fault is.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) enum Severity {
-    /// The value of a key.
-    Key(&'static str),
-    /// The value of a key, times the largest reading of the run without a fault.
-    OfLargest(&'static str),
-    /// The length of a vector with this direction.
-    Along(&'static str, [f64; 3]),
-    /// The number of cells.
-    Cells,
-    /// The number of joints.
-    Joints,
-    /// There is only one.
-    None,
-}
-
 /// What a fault adds to the force ceiling, for a physical reason.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Allowance {
-    None,
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "snake_case")]
+enum Allowance {
     /// The pad reads this fraction of the force, so the ceiling is that much higher.
     OverGain,
     /// A hand presses with this force.
@@ -85,351 +77,117 @@ pub(super) enum Allowance {
 }
 
 /// One row: a fault that grows.
-#[derive(Debug)]
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub(super) struct Row {
-    pub(super) name: &'static str,
+    pub(super) name: String,
     /// The word of `[[inject]]`.
-    pub(super) fault: &'static str,
-    /// Further keys of `[[inject]]`; `LARGEST` stands for the largest reading of the run without a fault.
-    pub(super) keys: &'static str,
-    /// How long the fault is there [s].
-    pub(super) lasts_s: f64,
-    pub(super) severity: Severity,
-    pub(super) unit: &'static str,
-    /// From the smallest on.
-    pub(super) severities: &'static [f64],
-    /// What may come of the smallest severity: in the approach, and in contact. After `stop`, the arm rests.
-    pub(super) expected: [&'static [Fate]; 2],
-    pub(super) allowance: Allowance,
-    pub(super) why: &'static str,
+    pub(super) fault: String,
+    #[serde(default)]
+    keys: String,
+    grow: String,
+    #[serde(default)]
+    of_largest: bool,
+    along: Option<[f64; 3]>,
+    /// How long the fault is there [s]; to the end of the run if not given.
+    lasts_s: Option<f64>,
+    pub(super) severities: Vec<f64>,
+    pub(super) unit: String,
+    approach: Vec<Fate>,
+    contact: Vec<Fate>,
+    allowance: Option<Allowance>,
+    why: String,
 }
 
-const HOLDS: &[Fate] = &[Fate::Holds];
-const LOSES: &[Fate] = &[Fate::Loses];
-const STOPS: &[Fate] = &[Fate::Halts, Fate::Fails];
-const HOLDS_OR_LOSES: &[Fate] = &[Fate::Holds, Fate::Loses];
-
-/// Largest speed with which the contact limit lets a stiff arm touch [m/s], times the root of the stiffness of the foam
-/// and the mass of the arm, 77 kN/m and 3 kg: what the moving mass adds to the force after the command has stopped [N].
-pub(super) const TOUCH_N: f64 = 6.0;
-/// The root of that stiffness and that mass [N s/m].
-pub(super) const HIT_N_S_PER_M: f64 = 480.0;
-
-const fn row(
-    name: &'static str,
-    fault: [&'static str; 2],
-    severity: Severity,
-    unit: &'static str,
-    severities: &'static [f64],
-    expected: [&'static [Fate]; 2],
-    why: &'static str,
-) -> Row {
-    let [fault, keys] = fault;
-    Row { name, fault, keys, lasts_s: 0.0, severity, unit, severities, expected, allowance: Allowance::None, why }
+#[derive(Deserialize)]
+struct Table {
+    row: Vec<Row>,
 }
-
-impl Row {
-    const fn allows(self, allowance: Allowance) -> Self {
-        Self { allowance, ..self }
-    }
-
-    const fn lasts(self, lasts_s: f64) -> Self {
-        Self { lasts_s, ..self }
-    }
-}
-
-use Severity::{Along, Cells, Joints, Key, OfLargest};
-
-const DELAYS: &[f64] = &[8.0, 20.0, 50.0, 100.0, 200.0];
-const FORCES: &[f64] = &[2.0, 5.0, 10.0, 20.0];
-const SPEEDS: &[f64] = &[0.005, 0.01, 0.02, 0.05];
-const BOTH: [&[Fate]; 2] = [HOLDS, HOLDS];
 
 /// The rows.
-pub(super) const ROWS: &[Row] = &[
-    row(
-        "dropped frames",
-        ["missing", ""],
-        Key("rate"),
-        "of the frames",
-        &[0.02, 0.1, 0.3, 0.6, 1.0],
-        BOTH,
-        "single frames do not count",
-    ),
-    row(
-        "repeated frames",
-        ["repeat", ""],
-        Key("rate"),
-        "of the frames",
-        &[0.05, 0.2, 0.5, 1.0],
-        BOTH,
-        "single frames do not count",
-    ),
-    row(
-        "delayed frames",
-        ["late", ""],
-        Key("delay_ms"),
-        "ms",
-        DELAYS,
-        BOTH,
-        "two periods of the pad are within the age that each node takes",
-    ),
-    row(
-        "jitter",
-        ["jitter", ""],
-        Key("delay_ms"),
-        "ms",
-        DELAYS,
-        BOTH,
-        "two periods of the pad are within the age that each node takes",
-    ),
-    row(
-        "garbage",
-        ["garbage", "reading = LARGEST"],
-        Key("frames"),
-        "frames",
-        &[1.0, 2.0, 3.0, 10.0, 50.0],
-        BOTH,
-        "one frame is not believed",
-    ),
-    row(
-        "not a number",
-        ["nan", "cells = 1"],
-        Key("frames"),
-        "frames",
-        &[1.0, 5.0, 50.0],
-        [STOPS, STOPS],
-        "such a sample is a fault of its role",
-    ),
-    row(
-        "dead cells",
-        ["dead", ""],
-        Cells,
-        "cells",
-        &[3.0, 8.0, 16.0, 64.0],
-        BOTH,
-        "the foam spreads a load over the neighbours",
-    ),
-    row(
-        "stuck cell",
-        ["stuck", "cells = 1"],
-        OfLargest("reading"),
-        "of the largest reading",
-        &[0.5, 1.0, 2.0, 10.0],
-        [HOLDS_OR_LOSES, HOLDS],
-        "a ceiling must feel a pin, so the way in is barred from some reading on",
-    ),
-    row(
-        "spikes",
-        ["spike", "cells = 1\nrate = 0.02"],
-        OfLargest("reading"),
-        "of the largest reading",
-        &[0.5, 1.0, 2.0, 10.0],
-        BOTH,
-        "one frame is not believed",
-    ),
-    row(
-        "gain too low",
-        ["gain", ""],
-        Key("factor"),
-        "of the reading",
-        &[0.8, 0.5, 0.2, 0.05],
-        BOTH,
-        "the pad reads less, so the ceiling is higher",
-    )
-    .allows(Allowance::OverGain),
-    row(
-        "gain too high",
-        ["gain", ""],
-        Key("factor"),
-        "of the reading",
-        &[1.25, 2.0, 5.0, 20.0],
-        BOTH,
-        "the arm presses less",
-    ),
-    row(
-        "drift up",
-        ["drift", ""],
-        OfLargest("reading_per_s"),
-        "of the largest reading per s",
-        &[0.01, 0.05, 0.2, 1.0],
-        [HOLDS_OR_LOSES, HOLDS],
-        "the arm presses less, until the way in is barred",
-    ),
-    row(
-        "drift down",
-        ["drift", ""],
-        OfLargest("reading_per_s"),
-        "of the largest reading per s",
-        &[-0.01, -0.05, -0.2, -1.0],
-        BOTH,
-        "the arm presses more, until the pad feels nothing",
-    ),
-    row("swapped cells", ["swapped", ""], Cells, "cells", &[2.0, 8.0, 32.0, 64.0], BOTH, "the sum is the same"),
-    row(
-        "lost commands",
-        ["lost", ""],
-        Key("frames"),
-        "commands",
-        &[1.0, 5.0, 12.0, 25.0],
-        BOTH,
-        "the device goes on as before",
-    ),
-    row(
-        "lagging commands",
-        ["lag", ""],
-        Key("delay_ms"),
-        "ms",
-        &[4.0, 12.0, 25.0, 50.0, 100.0],
-        BOTH,
-        "one period is within the phase margin of each loop",
-    ),
-    row(
-        "joint stops",
-        ["joint_stop", ""],
-        Joints,
-        "joints",
-        &[1.0, 2.0, 4.0, 16.0],
-        [HOLDS_OR_LOSES, HOLDS_OR_LOSES],
-        "the pad turns, and its limits hold as before",
-    ),
-    row("hand presses", ["push", ""], Along("push_n", [0.0, 0.0, 1.0]), "N", FORCES, BOTH, "the hand adds its force")
-        .allows(Allowance::Force)
-        .lasts(0.5),
-    row(
-        "hand pulls",
-        ["push", ""],
-        Along("push_n", [0.0, 0.0, -1.0]),
-        "N",
-        FORCES,
-        [HOLDS, HOLDS_OR_LOSES],
-        "the spring of the arm gives way",
-    )
-    .lasts(0.5),
-    row(
-        "hand pushes aside",
-        ["push", ""],
-        Along("push_n", [1.0, 0.0, 0.0]),
-        "N",
-        FORCES,
-        [HOLDS, HOLDS_OR_LOSES],
-        "the spring of the arm gives way",
-    )
-    .lasts(0.5),
-    row("object gone", ["gone", ""], Severity::None, "", &[1.0], [LOSES, LOSES], "there is nothing to touch"),
-    row(
-        "object stiff",
-        ["stiff", ""],
-        Key("factor"),
-        "of the stiffness",
-        &[2.0, 5.0, 20.0, 100.0],
-        BOTH,
-        "the foam of the pad stays soft",
-    ),
-    row(
-        "object moves away",
-        ["moving", ""],
-        Along("velocity_m_per_s", [0.0, 0.0, 1.0]),
-        "m/s",
-        SPEEDS,
-        [HOLDS_OR_LOSES, HOLDS_OR_LOSES],
-        "the arm follows, or has lost the contact",
-    )
-    .lasts(0.3),
-    row(
-        "object moves on",
-        ["moving", ""],
-        Along("velocity_m_per_s", [0.0, 0.0, -1.0]),
-        "m/s",
-        SPEEDS,
-        BOTH,
-        "its hit adds to the force",
-    )
-    .allows(Allowance::Hit)
-    .lasts(0.3),
-    row(
-        "object moves aside",
-        ["moving", ""],
-        Along("velocity_m_per_s", [1.0, 0.0, 0.0]),
-        "m/s",
-        SPEEDS,
-        [HOLDS_OR_LOSES, HOLDS_OR_LOSES],
-        "the arm follows, or has lost the contact",
-    )
-    .lasts(0.3),
-];
+pub(super) static ROWS: LazyLock<Vec<Row>> = LazyLock::new(|| {
+    let table: Table = toml::from_str(include_str!("table.toml")).expect("a test reads the same file");
+    table.row
+});
+
+/// What the moving mass of an arm adds to the force of a touch after the command has stopped [N]: the largest speed at
+/// which the contact limit lets a stiff arm touch, 12.6 mm/s, times [`HIT_N_S_PER_M`].
+const TOUCH_N: f64 = 6.0;
+/// The root of stiffness and mass, of 77 kN/m of foam under the whole pad and of 3 kg [N s/m].
+const HIT_N_S_PER_M: f64 = 480.0;
 
 impl Row {
     /// Returns what may come of the smallest severity in a phase.
     pub(super) fn expected(&self, phase: Phase) -> Vec<Fate> {
         match phase {
-            Phase::Approach => self.expected[0].to_vec(),
-            // A pad that has just touched may bounce, and the contact at a limit may be anywhere in a run.
-            Phase::FirstTouch | Phase::Steady | Phase::Sliding | Phase::AtALimit => self.expected[1].to_vec(),
+            Phase::Approach => self.approach.clone(),
+            Phase::FirstTouch | Phase::Steady | Phase::Sliding | Phase::AtALimit => self.contact.clone(),
             Phase::Ramping => vec![Fate::Halts, Fate::Fails],
         }
     }
 
     /// Returns the largest true force [N] that a fault of that severity may cause under a ceiling.
     pub(super) fn bound(&self, severity: f64, ceiling: f64) -> f64 {
-        TOUCH_N
-            + match self.allowance {
-                Allowance::None => ceiling,
-                Allowance::OverGain => ceiling / severity,
-                Allowance::Force => ceiling + severity,
-                Allowance::Hit => ceiling + severity * HIT_N_S_PER_M,
-            }
+        let allowed = match self.allowance {
+            None => ceiling,
+            Some(Allowance::OverGain) => ceiling / severity,
+            Some(Allowance::Force) => ceiling + severity,
+            Some(Allowance::Hit) => ceiling + severity * HIT_N_S_PER_M,
+        };
+        allowed + TOUCH_N
     }
 
-    /// Returns the entry `[[inject]]` of that severity for a role, from a time on [s].
+    /// Returns the entry `[[inject]]` of that severity for a role, from `at` [s] on.
     pub(super) fn entry(
         &self,
         severity: f64,
-        role: &str,
-        at: f64,
+        [role, at]: [&str; 2],
         largest: f64,
         joints: &[String],
         cells: usize,
     ) -> String {
-        let keys = self.keys.replace("LARGEST", &format!("{largest:?}"));
-        let grown = match self.severity {
-            Key("frames") => format!("frames = {severity}"),
-            Key(key) => format!("{key} = {severity:?}"),
-            OfLargest(key) => format!("{key} = {:?}", severity * largest),
-            Along(key, axis) => format!("{key} = {:?}", axis.map(|part| part * severity)),
-            Cells => format!("cells = {}", (severity as usize).min(cells)),
-            Joints => format!("joints = {:?}", chosen(joints, severity as usize)),
-            Severity::None => String::new(),
+        let value = match (self.grow.as_str(), self.along) {
+            ("frames", _) => format!("{severity}"),
+            ("cells", _) => format!("{}", (severity as usize).min(cells)),
+            ("joints", _) => format!("{:?}", chosen(joints, severity as usize)),
+            (_, Some(axis)) => format!("{:?}", axis.map(|part| part * severity)),
+            _ if self.of_largest => format!("{:?}", severity * largest),
+            _ => format!("{severity:?}"),
         };
-        let until = if self.lasts_s > 0.0 { format!("to_s = {:?}", at + self.lasts_s) } else { String::new() };
-        let head = format!("role = {role:?}\nfault = {:?}\nfrom_s = {at:?}", self.fault);
-        let lines = [head, until, keys, grown].into_iter().filter(|line| !line.is_empty());
-        format!("[[inject]]\n{}\n", lines.collect::<Vec<_>>().join("\n"))
+        let mut lines = vec![format!("role = {role:?}\nfault = {:?}\nfrom_s = {at}", self.fault)];
+        lines.extend(self.lasts_s.map(|lasts| format!("to_s = {:.3}", at.parse().unwrap_or(0.0) + lasts)));
+        lines.extend((!self.keys.is_empty()).then(|| self.keys.replace("LARGEST", &format!("{largest:?}"))));
+        lines.extend((!self.grow.is_empty()).then(|| format!("{} = {value}", self.grow)));
+        format!("[[inject]]\n{}\n", lines.join("\n"))
     }
 
-    /// Whether the fault spoils commands, or disturbs the world.
+    /// Whether the fault spoils commands.
     pub(super) fn is_of_commands(&self) -> bool {
-        matches!(self.fault, "lost" | "lag" | "joint_stop")
+        matches!(self.fault.as_str(), "lost" | "lag" | "joint_stop")
     }
 
-    /// See [`is_of_commands`](Self::is_of_commands).
+    /// Whether the fault disturbs the world.
     pub(super) fn is_of_world(&self) -> bool {
-        matches!(self.fault, "push" | "gone" | "stiff" | "moving")
+        matches!(self.fault.as_str(), "push" | "gone" | "stiff" | "moving")
     }
 
-    /// Returns the cells of the row in the table of the documentation.
-    pub(super) fn described(&self) -> [String; 6] {
+    /// Returns by how much later an image may show what has happened [s].
+    pub(super) fn delay(&self, severity: f64) -> f64 {
+        if matches!(self.fault.as_str(), "late" | "jitter") { severity * 1e-3 } else { 0.0 }
+    }
+
+    /// Returns the row as the documentation shows it.
+    fn described(&self) -> [String; 6] {
         let fates = |fates: &[Fate]| fates.iter().map(|fate| fate.name()).collect::<Vec<_>>().join(" or ");
         let grown: Vec<String> = self.severities.iter().map(f64::to_string).collect();
-        let force = match self.allowance {
-            Allowance::None => "ceiling + 6 N",
-            Allowance::OverGain => "ceiling / gain + 6 N",
-            Allowance::Force => "ceiling + 6 N + the push",
-            Allowance::Hit => "ceiling + 6 N + 480 N s/m times the speed",
-        };
         let grown = if self.unit.is_empty() { "-".to_owned() } else { format!("{} {}", grown.join(", "), self.unit) };
-        let [approach, contact] = self.expected.map(fates);
-        [self.name.to_owned(), grown, approach, contact, force.to_owned(), self.why.to_owned()]
+        let force = match self.allowance {
+            None => "ceiling + 6 N",
+            Some(Allowance::OverGain) => "ceiling / gain + 6 N",
+            Some(Allowance::Force) => "ceiling + 6 N + the push",
+            Some(Allowance::Hit) => "ceiling + 6 N + 480 N s/m of the speed",
+        };
+        [self.name.clone(), grown, fates(&self.approach), fates(&self.contact), force.to_owned(), self.why.clone()]
     }
 }
 
@@ -439,9 +197,31 @@ fn chosen(joints: &[String], count: usize) -> Vec<&str> {
     (0..count).map(|i| joints[(2 * i + 1) * joints.len() / (2 * count)].as_str()).collect()
 }
 
-/// Returns the rows of the table in the documentation: the fault, its severities, what is expected in the approach and in
+/// Returns the rows as the documentation shows them: the fault, its severities, what is expected in the approach and in
 /// contact, the bound of the force, and why.
 #[must_use]
 pub fn described() -> Vec<[String; 6]> {
     ROWS.iter().map(Row::described).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn severities_grow_away_from_no_fault_and_each_row_has_another_name() {
+        for (i, row) in ROWS.iter().enumerate() {
+            let steps: Vec<f64> = row.severities.windows(2).map(|pair| pair[1] - pair[0]).collect();
+            assert!(steps.iter().all(|step| step * steps[0] > 0.0), "{}", row.name);
+            assert!(ROWS[..i].iter().all(|other| other.name != row.name), "{}", row.name);
+        }
+    }
+
+    #[test]
+    fn joints_are_spread() {
+        let joints = ["a", "b", "c", "d", "e", "f", "g"].map(str::to_owned);
+        assert_eq!(chosen(&joints, 1), ["d"]);
+        assert_eq!(chosen(&joints, 2), ["b", "f"]);
+        assert_eq!(chosen(&joints, 16), ["a", "b", "c", "d", "e", "f", "g"]);
+    }
 }
