@@ -172,7 +172,7 @@ fn another_serial_number_behind_the_same_port_ends_the_device() {
     sensor.order("unplug");
     assert!(rig.wait_until(SOON, |rig| rig.lost("image").is_some()));
     sensor.order("replug B013");
-    let is_named = |rig: &mut LinkRig| rig.lost("image").is_some_and(|why| why.contains("number B013"));
+    let is_named = |rig: &LinkRig| rig.lost("image").is_some_and(|why| why.contains("number B013"));
     assert!(rig.wait_until(SOON, is_named), "{:?}", rig.lost("image"));
     let error = rig.stop().unwrap_err().to_string();
     assert!(error.contains("(serial number B012): another device has come back"), "{error}");

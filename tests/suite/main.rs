@@ -29,6 +29,7 @@ mod erased;
 mod errors;
 mod examples;
 mod explain;
+mod fault_matrix;
 mod faults;
 mod features;
 #[cfg(target_os = "linux")]

@@ -4,6 +4,7 @@ use std::path::Path;
 use std::sync::Arc;
 
 use serde::Serialize;
+use tracing::subscriber::{NoSubscriber, with_default};
 
 use super::{VerifyArgs, in_parallel};
 use crate::cli::shell::patience::Patience;
@@ -30,8 +31,9 @@ pub(super) fn verify_faults(graph: &Path, args: &VerifyArgs, shell: &Shell) -> R
         Err(Refusal::Message(message)) => return Err(message),
     };
     let work = matrix.cells(&args.only)?;
-    let cells =
-        in_parallel(work.len(), "cells", args.jobs, shell, &|i| matrix.attack(catalogue, work[i], &is_interrupted));
+    // Halts are what a fault should cause, so they are no warnings here.
+    let attack = |i: usize| with_default(NoSubscriber::new(), || matrix.attack(catalogue, work[i], &is_interrupted));
+    let cells = in_parallel(work.len(), "cells", args.jobs, shell, &attack);
     shell.set_patience(&patience.after_run());
     let cells: Vec<Cell> = cells.into_iter().filter_map(std::sync::OnceLock::into_inner).collect();
     let is_complete = cells.len() == work.len();
@@ -69,8 +71,9 @@ fn text(matrix: &Matrix, cells: &[Cell], has_colour: bool) -> String {
     }
     let failed = cells.iter().filter(|cell| !cell.has_passed()).count();
     let runs = cells.iter().map(|cell| cell.attacks.len()).sum();
-    let passed = cells.len() - failed;
-    format!("{text}\n\n{passed} passed, {failed} failed, in {}\n", count_of(runs, "run"))
+    let not_run = cells.iter().filter(|cell| cell.attacks.is_empty()).count();
+    let passed = cells.len() - failed - not_run;
+    format!("{text}\n\n{passed} passed, {failed} failed, {not_run} not run, in {}\n", count_of(runs, "run"))
 }
 
 fn unexpected(attack: &Attack) -> String {
@@ -79,7 +82,11 @@ fn unexpected(attack: &Attack) -> String {
 }
 
 fn row(cell: &Cell, has_colour: bool) -> [String; 9] {
-    let (text, colour) = if cell.has_passed() { ("passed", "\x1b[32m") } else { ("FAILED", "\x1b[1;31m") };
+    let (text, colour) = match (cell.attacks.is_empty(), cell.has_passed()) {
+        (true, _) => ("not run", "\x1b[33m"),
+        (_, true) => ("passed", "\x1b[32m"),
+        (_, false) => ("FAILED", "\x1b[1;31m"),
+    };
     let mark = if has_colour { format!("{colour}{text}\x1b[0m") } else { text.to_owned() };
     let expected: Vec<&str> = cell.expected.iter().map(|fate| fate.name()).collect();
     let first = cell.attacks.first();

@@ -21,7 +21,7 @@ pub(super) fn phases(run: &Run) -> [Option<f64>; 6] {
     let speeds = speeds(&run.moments);
     let after = touches.map_or(f64::INFINITY, |touches| touches + 0.5);
     let stretch = |least: f64, is_it: &dyn Fn(&Moment, [f64; 2]) -> bool| {
-        longest(run.moments.iter().zip(&speeds).map(|(one, speed)| (one.time, is_it(one, *speed))), least)
+        first_stretch(run.moments.iter().zip(&speeds).map(|(one, speed)| (one.time, is_it(one, *speed))), least)
     };
     let presses = |one: &Moment| one.sides[0].force > 0.0 && one.time > after;
     [
@@ -49,20 +49,18 @@ fn speeds(moments: &[Moment]) -> Vec<[f64; 2]> {
     moments.iter().enumerate().map(speed).collect()
 }
 
-/// Returns the middle of the longest stretch of at least `least` [s].
-fn longest(ticks: impl Iterator<Item = (f64, bool)>, least: f64) -> Option<f64> {
-    let (mut best, mut begin, mut last): (Option<[f64; 2]>, Option<f64>, f64) = (None, None, 0.0);
+/// Returns a time in the first stretch of at least `least` [s]: its middle, or 0.5 s after its begin.
+fn first_stretch(ticks: impl Iterator<Item = (f64, bool)>, least: f64) -> Option<f64> {
+    let (mut begin, mut last): (Option<f64>, f64) = (None, 0.0);
     for (time, is_it) in ticks.chain([(f64::INFINITY, false)]) {
         if is_it {
             begin.get_or_insert(time);
-        } else if let Some(from) = begin.take()
-            && last - from >= best.map_or(least, |[from, to]| to - from)
-        {
-            best = Some([from, last]);
+        } else if let Some(from) = begin.take().filter(|from| last - from >= least) {
+            return Some(from + ((last - from) / 2.0).min(0.5));
         }
         last = time;
     }
-    best.map(|[from, to]| (from + to) / 2.0)
+    None
 }
 
 /// Returns why a task has no such phase.
@@ -82,11 +80,12 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_longest_stretch_counts_from_its_first_tick_to_its_last() {
-        let ticks = |text: &str| text.chars().enumerate().map(|(i, one)| (i as f64, one == 'x')).collect::<Vec<_>>();
-        let middle = |text: &str| longest(ticks(text).into_iter(), 2.0);
-        assert_eq!(middle("..xx..xxxx..xxx"), Some(7.5));
-        assert_eq!(middle("..xx.xx"), None);
-        assert_eq!(middle("...xxx"), Some(4.0));
+    fn the_first_stretch_that_is_long_enough_counts() {
+        let at = |text: &str, least: f64| {
+            first_stretch(text.chars().enumerate().map(|(i, one)| (0.25 * i as f64, one == 'x')), least)
+        };
+        assert_eq!(at("..xx..xxx..xxxxxxx", 0.5), Some(1.75));
+        assert_eq!(at("..xx..xxx..xxxxxxx", 1.0), Some(3.25));
+        assert_eq!(at("..xx.xx", 0.5), None);
     }
 }
