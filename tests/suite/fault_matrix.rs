@@ -14,7 +14,7 @@ const SMOKE: [&str; 6] =
 
 #[test]
 fn a_task_withstands_faults_of_the_pad_the_commands_the_arm_and_the_object() {
-    let only = SMOKE.iter().flat_map(|fault| ["--only", fault]);
+    let only = SMOKE.into_iter().flat_map(|fault| ["--only", fault]);
     let said = say(&["verify", "--faults", "graphs/force.toml", "--json"].into_iter().chain(only).collect::<Vec<_>>());
     let json: Value = serde_json::from_str(&said.out).unwrap_or_else(|error| panic!("{error}: {}", said.err));
     let cells = json["cells"].as_array().unwrap();
@@ -77,8 +77,14 @@ fn what_cannot_be_attacked_says_why() {
 }
 
 #[test]
-fn the_page_shows_the_table_of_the_matrix() {
+fn the_page_shows_the_table_of_the_matrix_and_names_tests_that_exist() {
     let page = fs::read_to_string(workspace().join("docs/faults.md")).unwrap();
+    let tests: Vec<(&str, &str)> = page.split('`').filter_map(|word| word.split_once(".rs::")).collect();
+    assert!(tests.len() > 15);
+    for (path, name) in tests {
+        let text = fs::read_to_string(workspace().join(format!("{path}.rs"))).unwrap();
+        assert!(text.contains(&format!("fn {name}(")), "{path}.rs has no {name}");
+    }
     let (_, table) = page.split_once("| fault | severities |").unwrap();
     let shown: Vec<&str> = table.lines().skip(2).take_while(|line| line.starts_with('|')).collect();
     let wanted: Vec<String> = described().iter().map(|cells| format!("| {} |", cells.join(" | "))).collect();

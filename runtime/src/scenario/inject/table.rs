@@ -231,7 +231,8 @@ impl InjectBlock {
         if let Some(key) = foreign {
             let message = format!("the fault `{word}` has no `{key}`");
             let known: Vec<&str> = fault.takes().collect();
-            let help = format!("remove it; besides `role`, `fault`, `from_s` and `to_s` it has {}", quoted(known));
+            let all = ["role", "fault", "from_s", "to_s"].into_iter().chain(known);
+            let help = format!("remove it; the fault has {}", quoted(all));
             return Some(Diagnostic::new(Code::UnknownKey, self.key(key)?, message).help(help));
         }
         let is_alone = match table.cells.as_ref().map(|cells| &cells.value) {
