@@ -8,14 +8,17 @@ use tactflow_tests::workspace;
 
 use crate::tool::say;
 
-/// The smoke part: one task, and faults of the pad, the commands, the arm and the object.
+/// The smoke part: one task in three phases, and faults of the pad, the commands, the arm and the object.
+const PHASES: [&str; 3] = ["approach", "steady", "ramping"];
 const SMOKE: [&str; 6] =
     ["dropped frames", "not a number", "gain too low", "lost commands", "hand presses", "object gone"];
 
 #[test]
 fn a_task_withstands_faults_of_the_pad_the_commands_the_arm_and_the_object() {
     let only = SMOKE.into_iter().flat_map(|fault| ["--only", fault]);
-    let said = say(&["verify", "--faults", "graphs/force.toml", "--json"].into_iter().chain(only).collect::<Vec<_>>());
+    let phases = PHASES.into_iter().flat_map(|phase| ["--phase", phase]);
+    let args = ["verify", "--faults", "graphs/force.toml", "--json"].into_iter().chain(only).chain(phases);
+    let said = say(&args.collect::<Vec<_>>());
     let json: Value = serde_json::from_str(&said.out).unwrap_or_else(|error| panic!("{error}: {}", said.err));
     let cells = json["cells"].as_array().unwrap();
     let broken: Vec<&Value> = cells.iter().filter(|cell| cell["ok"] != true).collect();
@@ -24,7 +27,7 @@ fn a_task_withstands_faults_of_the_pad_the_commands_the_arm_and_the_object() {
     let missing: Vec<&str> =
         json["missing"].as_array().unwrap().iter().filter_map(|one| one["phase"].as_str()).collect();
     assert_eq!(missing, ["sliding"]);
-    assert_eq!(cells.len(), SMOKE.len() * 5);
+    assert_eq!(cells.len(), SMOKE.len() * PHASES.len());
     let fate = |fault: &str, phase: &str, attack: usize| {
         let cell = cells.iter().find(|cell| cell["fault"] == fault && cell["phase"] == phase).unwrap();
         (cell["attacks"][attack]["fate"].clone(), cell["attacks"][attack]["cause"].clone())
@@ -39,9 +42,10 @@ fn a_task_withstands_faults_of_the_pad_the_commands_the_arm_and_the_object() {
 
 #[test]
 fn a_fault_of_the_matrix_comes_again_in_a_scenario() {
-    let said = say(&["verify", "--faults", "graphs/force.toml", "--json", "--only", "hand presses"]);
+    let said =
+        say(&["verify", "--faults", "graphs/force.toml", "--json", "--only", "hand presses", "--phase", "steady"]);
     let json: Value = serde_json::from_str(&said.out).unwrap();
-    let steady = json["cells"].as_array().unwrap().iter().find(|cell| cell["phase"] == "steady").unwrap();
+    let steady = json["cells"].as_array().unwrap().first().unwrap();
     let attack = &steady["attacks"][1];
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("again.toml");
@@ -67,6 +71,7 @@ fn what_cannot_be_attacked_says_why() {
     let cases = [
         (&["--faults", "graphs/finger_press.toml"][..], "no pad of this task has a true force"),
         (&["--faults", "graphs/force.toml", "--only", "gremlins"], "there is no fault `gremlins`"),
+        (&["--faults", "graphs/force.toml", "--phase", "noon"], "there is no phase `noon`"),
         (&["--faults", "graphs/force.toml", "--seeds", "3"], "cannot be used with"),
         (&["--bench", "graphs/benches/ball.toml"], "--faults"),
     ];

@@ -30,7 +30,7 @@ pub(super) fn verify_faults(graph: &Path, args: &VerifyArgs, shell: &Shell) -> R
         Err(Refusal::Report(report)) => return Ok(shell.reject(&report)),
         Err(Refusal::Message(message)) => return Err(message),
     };
-    let work = matrix.cells(&args.only)?;
+    let work = matrix.cells(&args.only, &args.phase)?;
     // Halts are what a fault should cause, so they are no warnings here.
     let attack = |i: usize| with_default(NoSubscriber::new(), || matrix.attack(catalogue, work[i], &is_interrupted));
     let cells = in_parallel(work.len(), "cells", args.jobs, shell, &attack);

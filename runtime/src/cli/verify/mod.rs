@@ -47,6 +47,9 @@ pub(crate) struct VerifyArgs {
     /// Fault for `--faults`, instead of all; several are allowed
     #[arg(long, value_name = "FAULT", requires = "faults")]
     only: Vec<String>,
+    /// Phase for `--faults`, instead of all; several are allowed
+    #[arg(long, value_name = "PHASE", requires = "faults")]
+    phase: Vec<String>,
     /// Run each scenario that has `seeds` with the seeds 1 to N instead of its own
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..=10_000))]
     seeds: Option<u64>,

@@ -130,18 +130,17 @@ impl Matrix {
         phases.filter(|(_, at)| at.is_none()).map(|(phase, _)| (phase, missing(phase)))
     }
 
-    /// Returns the cells of the faults with these names, or of all faults: the number of the fault, and the phase.
+    /// Returns the cells of the faults and the phases with these names, or of all: the number of the fault, and the phase.
     ///
     /// # Errors
-    /// If there is no fault with a name.
-    pub fn cells(&self, only: &[String]) -> Result<Vec<(usize, Phase)>, String> {
-        let names = || ROWS.iter().map(|row| row.name.as_str());
-        if let Some(name) = only.iter().find(|name| !names().any(|known| known == **name)) {
-            return Err(format!("there is no fault `{name}`: the faults are {}", quoted(names())));
-        }
-        let rows = (0..ROWS.len()).filter(|row| only.is_empty() || only.iter().any(|name| *name == ROWS[*row].name));
-        let here: Vec<Phase> = Phase::ALL.into_iter().filter(|phase| self.phases[*phase as usize].is_some()).collect();
-        Ok(rows.flat_map(|row| here.iter().map(move |phase| (row, *phase))).collect())
+    /// If there is no fault or no phase with a name.
+    pub fn cells(&self, faults: &[String], phases: &[String]) -> Result<Vec<(usize, Phase)>, String> {
+        let (rows, known) = (ROWS.iter().map(|row| row.name.as_str()), Phase::ALL.iter().map(|phase| phase.name()));
+        let rows = wanted("fault", faults, &rows.collect::<Vec<_>>())?;
+        let phases = wanted("phase", phases, &known.collect::<Vec<_>>())?;
+        let here = phases.into_iter().filter(|phase| self.phases[*phase].is_some());
+        let here: Vec<Phase> = here.map(|phase| Phase::ALL[phase]).collect();
+        Ok(rows.into_iter().flat_map(|row| here.iter().map(move |phase| (row, *phase))).collect())
     }
 
     /// Attacks the task with a fault in a phase, with growing severity until the outcome changes. Returns `None` if it was
@@ -212,6 +211,14 @@ impl Matrix {
         let injections = resolve(read(&entry)?, &mut compiled, &mut found);
         found.first().map_or(Ok((entry, injections)), |mistake| Err(mistake.message.clone()))
     }
+}
+
+/// Returns the numbers of the names that are wanted, in the order in which they are known; without any, all.
+fn wanted(what: &str, names: &[String], known: &[&str]) -> Result<Vec<usize>, String> {
+    if let Some(name) = names.iter().find(|name| !known.contains(&name.as_str())) {
+        return Err(format!("there is no {what} `{name}`: the {what}s are {}", quoted(known)));
+    }
+    Ok((0..known.len()).filter(|i| names.is_empty() || names.iter().any(|name| name == known[*i])).collect())
 }
 
 /// Reads entries `[[inject]]`.
