@@ -200,3 +200,104 @@ fn rest(
     }
     (rest, Some(farthest * 1e3))
 }
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::Vector3;
+
+    use super::*;
+    use crate::scenario::matrix::attack::Reading;
+    use crate::scenario::matrix::table::ROWS;
+
+    const PERIOD: f64 = 0.004;
+
+    fn scene() -> Scene {
+        let side = Side {
+            pad: "pad".into(),
+            image: "pad.image".into(),
+            cells: 256,
+            force: "truth.force".into(),
+            pose: None,
+            twist: None,
+            force_n: Some(15.0),
+            speed: Some(0.05),
+            acceleration: Some(2.0),
+        };
+        Scene { sides: vec![side], devices: vec![("arm".into(), vec![1.0])], arm: None, period: PERIOD }
+    }
+
+    /// A run of 5 s with a force and a commanded velocity along z at each time. The joint is told as much as the sensor.
+    fn run(force: impl Fn(f64) -> f64, into: impl Fn(f64) -> f64) -> Run {
+        let moment = |tick: u32| {
+            let time = f64::from(tick) * PERIOD;
+            let velocity = Some(Vector3::new(0.0, 0.0, into(time)));
+            let place = Vector3::new(0.0, 0.0, into(time) * time);
+            let sides = vec![Reading { force: force(time), place, axis: Vector3::z(), velocity }];
+            Moment { time, sides, is_limited: false, commands: vec![into(time)] }
+        };
+        Run { moments: (0..1250).map(moment).collect(), is_at_rest: true, ..Run::default() }
+    }
+
+    fn broken(fault: &str, phase: Phase, run: &Run) -> Vec<String> {
+        let row = ROWS.iter().find(|row| row.name == fault).expect("the table has it");
+        let reference = self::run(|_| 4.0, |_| 0.0);
+        let strike = Strike { row, severity: row.severities[0], phase, at: 2.0 };
+        judge(&scene(), strike, [&reference, run], String::new()).broken
+    }
+
+    #[test]
+    fn each_promise_can_be_broken() {
+        let lost = |time: f64| if time < 2.0 { 4.0 } else { 0.0 };
+        let creeps =
+            |speed: f64, from: f64| move |time: f64| if time < from { 0.0 } else { speed.min((time - from) * 0.9) };
+        let gone = |into: &dyn Fn(f64) -> f64| broken("object gone", Phase::Steady, &run(lost, into));
+        // A search that begins late enough and is slow enough breaks nothing.
+        assert_eq!(gone(&creeps(0.005, 2.5)), [""; 0]);
+        assert!(gone(&creeps(0.005, 2.2))[0].contains("into the void, 0.21 s after"), "it pushes too soon");
+        assert!(gone(&creeps(0.02, 2.5))[0].contains("into the void"), "it searches too fast");
+        let force = |most: f64| {
+            broken("lost commands", Phase::Steady, &run(|time| if time > 3.0 { most } else { 4.0 }, |_| 0.0))
+        };
+        assert_eq!(force(20.9), [""; 0]);
+        assert_eq!(force(21.1), ["the force on `pad` is 21.1 N, more than 21.0 N"]);
+        let told = |into: &dyn Fn(f64) -> f64| broken("lost commands", Phase::Steady, &run(|_| 4.0, into));
+        assert!(
+            told(&|time| if time < 3.0 { 0.0 } else { (time - 3.0) * 0.9 })
+                .iter()
+                .any(|one| one.contains("mm/s at 3.0"))
+        );
+        let jumps = told(&|time| if time < 3.0 { 0.0 } else { 0.01 });
+        assert!(jumps[0].contains("2.50 m/s2") && jumps[1].contains("2.50 rad/s2"), "{jumps:?}");
+        let mut standing = run(|_| 4.0, |_| 0.0);
+        standing.is_at_rest = false;
+        assert_eq!(broken("lost commands", Phase::Steady, &standing), ["a command is left standing at the end"]);
+        standing.halts = vec![(2.0, String::new())];
+        assert!(
+            broken("lost commands", Phase::Steady, &standing)
+                .contains(&"the run has ended without a named cause".to_owned())
+        );
+    }
+
+    #[test]
+    fn after_a_stop_the_commands_rest_in_time_and_the_sensor_stays() {
+        let stopped = |ramp: f64| {
+            let mut run = run(|_| 4.0, |time| (0.04 - (time - 2.0).max(0.0) * 0.04 / ramp).max(0.0));
+            run.halts = vec![(2.0, "the operator sent `stop`".into())];
+            run
+        };
+        // 0.04 rad/s with 1 rad/s2 takes 40 ms.
+        let rests = |ramp: f64| broken("lost commands", Phase::Ramping, &stopped(ramp));
+        assert!(rests(0.045).iter().all(|one| !one.contains("rest")), "{:?}", rests(0.045));
+        assert!(
+            rests(0.058)[0].contains("the commands rest after 0.060 s and not within 0.052 s"),
+            "{:?}",
+            rests(0.058)
+        );
+        // The test's sensor is back at its origin at rest: 79.8 mm from where it was.
+        assert!(
+            rests(0.045)[0].contains("a sensor moves 79.8 mm after the stop, more than 7.6 mm"),
+            "{:?}",
+            rests(0.045)
+        );
+    }
+}
