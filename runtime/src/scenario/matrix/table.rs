@@ -155,7 +155,7 @@ impl Row {
             _ => format!("{severity:?}"),
         };
         let mut lines = vec![format!("role = {role:?}\nfault = {:?}\nfrom_s = {at}", self.fault)];
-        lines.extend(self.lasts_s.map(|lasts| format!("to_s = {:.3}", at.parse().unwrap_or(0.0) + lasts)));
+        lines.extend(self.lasts_s.map(|lasts| format!("to_s = {:.3}", at.parse::<f64>().unwrap_or(0.0) + lasts)));
         lines.extend((!self.keys.is_empty()).then(|| self.keys.replace("LARGEST", &format!("{largest:?}"))));
         lines.extend((!self.grow.is_empty()).then(|| format!("{} = {value}", self.grow)));
         format!("[[inject]]\n{}\n", lines.join("\n"))
