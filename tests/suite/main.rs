@@ -30,6 +30,7 @@ mod erased;
 mod errors;
 mod examples;
 mod explain;
+mod fault_matrix;
 mod faults;
 mod features;
 #[cfg(target_os = "linux")]

@@ -1,9 +1,10 @@
 //! The physics of the simulated bench: an arm with a pad, and objects, stepped together.
 
-use parry3d_f64::math::Vec3;
+use parry3d_f64::math::{Rot3, Vec3};
+use tactflow_runtime::device::Disturbance;
 use tactflow_runtime::signal::ImageShape;
 
-use super::contact::Contact;
+use super::contact::{Contact, Wrench};
 use super::foam::Foam;
 use super::imprint::Imprint;
 use super::joints::SimArm;
@@ -17,6 +18,10 @@ pub struct World {
     pub(super) contact: Contact,
     pub(super) imprint: Imprint,
     pub(super) shape: ImageShape,
+    /// Axes of the sensor at the start, in the base.
+    axes: Rot3,
+    /// Force of a hand on the sensor, in the base [N].
+    push: Vec3,
     /// Force on each object [N].
     loads: Vec<Vec3>,
     /// Simulated time [s].
@@ -39,7 +44,8 @@ impl World {
         let loads = vec![Vec3::ZERO; objects.len()];
         let from = arm.motion().pose;
         let survey = objects.iter().enumerate().find_map(|(i, object)| Some((i, Survey::new(object, from)?)));
-        Self { survey, arm, objects, contact, imprint, shape, loads, time: 0.0, max_step, is_stale: true }
+        let (axes, push) = (from.rotation, Vec3::ZERO);
+        Self { survey, arm, objects, contact, imprint, shape, axes, push, loads, time: 0.0, max_step, is_stale: true }
     }
 
     /// Advances to `time` [s], with the equilibrium of the joints moving at `velocity` [rad/s].
@@ -52,10 +58,19 @@ impl World {
                 object.step(now, dt, *load);
             }
             self.contact.step(dt, &self.arm.motion(), &self.objects, &mut self.loads);
-            self.arm.step(dt, velocity, &self.contact.wrench);
+            let Wrench { force, moment } = self.contact.wrench;
+            self.arm.step(dt, velocity, &Wrench { force: force + self.push, moment });
         }
         self.time = time;
         self.is_stale = true;
+    }
+
+    /// Disturbs the world from now on.
+    pub fn disturb(&mut self, disturbance: &Disturbance) {
+        let Disturbance { push, velocity, stiffness, is_gone } = *disturbance;
+        self.push = self.axes * Vec3::from(push);
+        let velocity = self.axes * Vec3::from(velocity);
+        self.objects.iter_mut().for_each(|object| object.disturb(velocity, stiffness, is_gone));
     }
 
     /// Returns whether all positions are finite and plausible, so that the simulation is stable.

@@ -8,7 +8,9 @@ mod check;
 
 use std::borrow::Cow;
 
-use tactflow_runtime::device::{Commands, Description, Device, DeviceError, Driver, Opened, Output, Samples, Stepped};
+use tactflow_runtime::device::{
+    Commands, Description, Device, DeviceError, Disturbance, Driver, Opened, Output, Samples, Stepped,
+};
 use tactflow_runtime::node::{Describe, Mistakes, Param, PortSpec};
 use tactflow_runtime::signal::{Image, ImageShape, Joint, Kind, Pose, Scalar, ScalarShape, Unit};
 
@@ -196,6 +198,11 @@ impl Stepped for SimBench {
 
     fn end(&self) -> Option<i64> {
         self.beats.end()
+    }
+
+    fn disturb(&mut self, disturbance: &Disturbance) -> bool {
+        self.world.disturb(disturbance);
+        true
     }
 
     fn exchange(&mut self, now: i64, commands: &Commands, samples: &mut Samples) -> Result<(), DeviceError> {
