@@ -4,7 +4,8 @@
 //!    pose, eq. 4). Damping depends on the frame, so it is done in the frame of the task.
 //! 2. [`damped::solve`]: an inverse that damps only near-singular directions.
 //! 3. [`null_space::project`]: motion toward the posture, if there is one, that leaves the sensor exactly still.
-//! 4. [`joint_limits`]: speed and position limits that keep the direction; the posture gets what the task leaves.
+//! 4. [`joint_limits`]: within the speeds and the ranges of the joints the elbow gives way first, then the task is slowed
+//!    down and keeps its direction; the posture gets what the task leaves.
 //!
 //! The state is scratch memory alone: each output depends only on the inputs of its step.
 
@@ -13,22 +14,27 @@ use tactflow_runtime::node::{
 };
 use tactflow_runtime::signal::{Jacobian, Joint, Joints, JointsShape, Pose, Scalar, ScalarShape, Twist, Unit};
 
+use super::joint_limits::{Elbow, interval};
 use super::joint_names::names;
-use super::{damped, joint_limits, null_space};
+use super::{damped, null_space};
 
 /// Moves the arm: computes joint velocities for a twist, within the limits of the arm.
 ///
 /// Resolved motion rate control, as in section IV of the paper. Twist and Jacobian are moved to the origin of the
-/// sensor, where the task is defined. A damped inverse damps only the directions whose singular value is below
-/// `damping`, so the arm follows the twist exactly when it is far from a singularity.
+/// sensor, where the task is defined. The arm follows the twist exactly while every singular value of the Jacobian is
+/// at least `damping`. Below, only the nearly lost directions are damped. `sigma` and `damping` tell how near a
+/// singularity is, and `lost` is the part of the twist that is not followed. What remains of a slide never becomes a
+/// push: the velocity along z of the sensor is between 0 and the wanted one, but for 0.5 % of the rest of the twist.
 ///
 /// An arm with more than six joints can move its elbow while the sensor stays still. It drifts toward `posture`, at
-/// `posture_gain`. The speed and position limits of the model are kept: a command that is too fast is slowed down as a
-/// whole and keeps its direction.
+/// `posture_gain`. Where a joint cannot move as fast as the twist needs, the elbow gives way first. Only if that is
+/// not enough, the twist is slowed down as a whole and keeps its direction: `share` is the fraction of it that remains,
+/// 1 far from every limit. `limited` says which joints are the reason.
 ///
-/// One joint at its limit stops the motion that needs it. `share` is the fraction of the twist that remains, 1 far
-/// from every limit. Without a twist the velocity is absent. This node does not smooth the beginning and the end of a
-/// motion, and does not stop old commands: put a `joint_limit` between it and the arm.
+/// This node decides how the joints share a motion within their speeds and ranges. It approaches a limit so slowly
+/// that the joint can brake with the acceleration that the arm states. It guarantees no limit: `joint_limit`, the
+/// node between it and the arm, owns the limits of the joints. It also ramps, and stops old commands. Without
+/// a twist the velocity is absent.
 ///
 /// ```toml
 /// [nodes.ik]
@@ -50,7 +56,7 @@ pub struct IkSink {
 /// Parameters of `ik_sink`.
 #[derive(Debug, Clone, Param)]
 pub struct Params {
-    /// Singular values below this are damped.
+    /// Singular values below this are damped, and no others.
     #[param(unit = "1, m", above = 0.0, default = 0.05)]
     damping: f64,
     /// Posture that the arm drifts toward without moving the sensor, one entry for each joint; in m for
@@ -60,8 +66,8 @@ pub struct Params {
     /// Speed of the drift for each unit of distance.
     #[param(unit = "1/s", range = 0.0.., default = 0.5, live)]
     posture_gain: f64,
-    /// Maximum speed toward a position limit for each unit of distance to it. The default is 5, or half the rate of the
-    /// graph if that is less.
+    /// Maximum speed toward a position limit for each unit of distance to it, as far as the joint can brake. The default
+    /// is 5, or half the rate of the graph if that is less.
     #[param(unit = "1/s", above = 0.0)]
     limit_gain: Option<f64>,
 }
@@ -92,6 +98,19 @@ pub struct Outputs {
     /// Fraction of the twist that the joint limits leave. The drift toward the posture does not count.
     #[port(unit = "1", frame = "_")]
     share: Out<Scalar>,
+    /// 1 for a joint whose largest velocity the twist and the drift together exceed, -1 for its smallest one, else 0.
+    #[port(unit = "1", robot = "R")]
+    limited: Out<Joints>,
+    /// Smallest singular value of the Jacobian at the sensor, in m and rad. Above `damping` it is a lower bound, up to
+    /// 22 % too small.
+    #[port(unit = "1", frame = "_")]
+    sigma: Out<Scalar>,
+    /// Fraction of the weakest direction that is lost: 0 far from a singularity, 1 at it.
+    #[port(unit = "1", frame = "_")]
+    damping: Out<Scalar>,
+    /// The part of the twist that is lost near a singularity. It is no motion to be commanded.
+    #[port(frame = "S")]
+    lost: Out<Twist>,
 }
 
 /// What `ik_sink` remembers.
@@ -99,10 +118,9 @@ pub struct Outputs {
 pub struct State {
     /// The Jacobian's columns at the sensor.
     columns: Vec<[f64; 6]>,
-    /// Scratch memory of the null space.
-    rows: Vec<null_space::Row>,
     /// Motion toward the posture [rad/s].
     drift: Vec<f64>,
+    elbow: Elbow,
 }
 
 impl Node for IkSink {
@@ -117,33 +135,43 @@ impl Node for IkSink {
         let shape = &setup.inputs.joints;
         check(&params, shape, &setup.inputs.jacobian.0, setup.period)?;
         setup.outputs.velocity = shape.in_unit(Unit::RADIAN.per_second());
+        setup.outputs.limited = shape.in_unit(Unit::ONE);
         setup.outputs.share = ScalarShape::of(Unit::ONE).within(0.0, 1.0);
+        setup.outputs.sigma = ScalarShape::of(Unit::ONE);
+        setup.outputs.damping = ScalarShape::of(Unit::ONE).within(0.0, 1.0);
         let limit_gain = params.limit_gain.unwrap_or(max_limit_gain(setup.period).min(5.0));
         Ok(Self { joints: shape.joints.clone(), params, limit_gain })
     }
 
     fn state(&self) -> State {
         let count = self.joints.len();
-        State { columns: vec![[0.0; 6]; count], rows: vec![[0.0; 8]; count], drift: vec![0.0; count] }
+        State { columns: vec![[0.0; 6]; count], drift: vec![0.0; count], elbow: Elbow::new(count) }
     }
 
     fn step(&self, _: &Tick, inputs: Inputs<'_>, out: &mut Outputs, state: &mut State) {
+        let State { columns, drift, elbow } = state;
         let velocity = &mut out.velocity.write().0;
         let q = &inputs.joints.0;
         // A copy, so that it stays in registers while the columns are written.
         let pose = *inputs.sensor_pose.value();
-        for (column, of_base) in state.columns.iter_mut().zip(&inputs.jacobian.0) {
+        for (column, of_base) in columns.iter_mut().zip(&inputs.jacobian.0) {
             *column = at_sensor(&pose, of_base);
         }
-        damped::solve(&state.columns, &at_sensor(&pose, &inputs.twist), self.params.damping, velocity);
-        out.share.set(joint_limits::limit(&self.joints, q, self.limit_gain, velocity));
+        let nearness = damped::solve(columns, &at_sensor(&pose, &inputs.twist), self.params.damping, velocity);
+        drift.fill(0.0);
         if let Some(posture) = &self.params.posture {
-            for ((drift, posture), q) in state.drift.iter_mut().zip(posture).zip(q) {
+            for ((drift, posture), q) in drift.iter_mut().zip(posture).zip(q) {
                 *drift = self.params.posture_gain * (posture - q);
             }
-            null_space::project(&state.columns, &mut state.rows, &mut state.drift);
-            joint_limits::add_within(&self.joints, q, self.limit_gain, velocity, &state.drift);
+            null_space::project(columns, &mut elbow.rows, drift);
         }
+        for ((room, joint), q) in elbow.intervals.iter_mut().zip(&self.joints).zip(q) {
+            *room = interval(joint, *q, self.limit_gain);
+        }
+        out.share.set(elbow.fit(columns, velocity, drift, &mut out.limited.write().0));
+        out.sigma.set(nearness.sigma);
+        out.damping.set(nearness.damping);
+        out.lost.set(Twist(nearness.lost.into()));
     }
 }
 
