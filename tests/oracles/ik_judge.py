@@ -18,10 +18,11 @@ The metrics, of which a lower value is better:
   counts as stopped.
 - push: speed along z of the sensor that a slide gets, as a fraction of the speed of the slide.
 - stuck: motions of 0.5 s with the twist held after which the arm follows less than a tenth of the twist.
+- lost: mean length of the part of the twist that is not made, as a fraction of the twist.
 - slowed: mean fraction of the twist that is missing along its direction.
 - jump: change of the velocities between two postures that are 1e-4 rad apart [rad/s].
 - posture: distance of the motion of the elbow from the one toward home, as a fraction of the latter; arms with an
-  elbow, ordinary postures.
+  elbow, ordinary postures in which the twist and the posture can both be had within the speeds and braking distances.
 """
 
 import argparse
@@ -53,6 +54,7 @@ HOMES = {
 }
 ACCELERATIONS = {"lwr4p": 10.0, "panda": 7.5, "ur5e": 10.0}  # [rad/s2]
 POSTURE_GAIN = 0.5  # [1/s]
+BRAKING_DELAY = 0.2  # [s], of `ik_sink`
 WEIGHT = np.array([1.0, 1.0, 1.0, 0.2, 0.2, 0.2])  # [1, m]
 KINDS = ("ordinary", "limit", "singular")
 
@@ -141,6 +143,7 @@ class Metrics:
         self.add("braking", kind, overruns(robot, q, v))
         along = achieved @ asked / size**2
         self.add("slowed", kind, 1 - along)
+        self.add("lost", kind, np.linalg.norm(achieved - asked) / size)
         moved = np.linalg.norm(achieved)
         if moved > 0.01 * size:
             # The arc tangent is exact for small angles.
@@ -153,8 +156,12 @@ class Metrics:
             last = WEIGHT * (robot.jacobian(path[-2]) @ ((path[-1] - path[-2]) / robot.dt))
             self.add("stuck", kind, last @ asked / size**2 < 0.1)
         if kind == "ordinary" and len(q) > 6:
-            null = np.eye(len(q)) - np.linalg.pinv(j) @ j
+            inverse = np.linalg.pinv(j)
+            null = np.eye(len(q)) - inverse @ j
             wanted = null @ (POSTURE_GAIN * (robot.home - q))
+            both = inverse @ twist + wanted
+            if violates(robot, q, both) or overruns(robot, q, both, BRAKING_DELAY, -1e-6):
+                return
             self.add("posture", kind, np.linalg.norm(null @ v - wanted) / max(np.linalg.norm(wanted), 1e-3))
 
 
@@ -166,9 +173,11 @@ def violates(robot, q, v):
     return bool((np.abs(v) > robot.speed * (1 + 1e-6)).any() or (inside & outside).any())
 
 
-def overruns(robot, q, v):
+def overruns(robot, q, v, delay=0.0, tolerance=1e-6):
+    """Whether a joint that keeps its speed for the delay [s] cannot stop before its limit."""
     room = np.where(v > 0, robot.upper - q, q - robot.lower).clip(0)
-    return bool((np.abs(v) > np.sqrt(2 * robot.acceleration * room) + 1e-6).any())
+    fastest = robot.acceleration * (np.sqrt(delay**2 + 2 * room / robot.acceleration) - delay)
+    return bool((np.abs(v) > fastest + tolerance).any())
 
 
 def steps(robot, q, path):
@@ -230,7 +239,7 @@ def table(all_metrics):
     rows = []
     for name, show in (
         ("failed", percent), ("limits", percent), ("braking", percent), ("turn", percentiles), ("push", percentiles),
-        ("stuck", percent), ("slowed", percent), ("jump", percentiles), ("posture", percentiles),
+        ("stuck", percent), ("lost", percent), ("slowed", percent), ("jump", percentiles), ("posture", percentiles),
     ):
         for kind in KINDS:
             cells = [metrics.values.get((name, kind)) for metrics in all_metrics.values()]

@@ -6,8 +6,8 @@
 //! have continuous derivatives, so the result has no step where the damping begins.
 //!
 //! What is lost can turn a motion: the part of a slide that remains can point into the object. So the twist is asked
-//! with another component along z of the sensor, the one with which the component that results is between 0 and
-//! the one that is wanted. It changes the result only where a direction is damped.
+//! with another component along z of the sensor, with which the component that results is between 0 and the one that is
+//! wanted. This holds while at most half of any direction is lost; [`least_lost`](super::least_lost) takes over before.
 //!
 //! Cost: one inverse of a 6x6 matrix proves that no direction needs damping. Only if it does not are the eigenvectors
 //! computed, by Jacobi rotations.
@@ -15,25 +15,22 @@
 /// Smallest damping for which double precision is enough.
 pub const MIN_DAMPING: f64 = 1e-3;
 /// Index of the component of a twist that pushes: along z of the sensor.
-const PUSH: usize = 2;
-/// Keeps the correction of a push finite where z itself is lost [1]. A push of at most half its root times the other
-/// motion remains.
-const PUSH_SOFTENING: f64 = 1e-4;
+pub const PUSH: usize = 2;
+/// The correction of a push is exact while at least this share of z remains [1].
+const LEAST_SHARE: f64 = 0.5;
 /// Most sweeps of Jacobi rotations. They converge quadratically: 6x6 matrices need 5 to 8 (Golub and Van Loan, *Matrix
 /// Computations*, section 8.5).
 const MAX_SWEEPS: usize = 12;
 
 type Matrix = [[f64; 6]; 6];
 
-/// How near a singularity the Jacobian is, and what of the twist this costs.
+/// How near a singularity the Jacobian is.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Nearness {
     /// Smallest singular value. Above the damping it can be up to 22 % too small.
     pub sigma: f64,
     /// Fraction of its direction that the damping takes.
     pub damping: f64,
-    /// The part of the twist that the velocities do not produce [m/s, rad/s].
-    pub lost: [f64; 6],
 }
 
 /// Writes to `out` the joint velocities [rad/s] that produce `twist` [m/s, rad/s], damped below the singular value
@@ -45,7 +42,7 @@ pub fn solve(columns: &[[f64; 6]], twist: &[f64; 6], damping: f64, out: &mut [f6
     let regular = inverse(gram, square).map(|inverse| (smallest(&inverse), inverse));
     let (back, nearness) = match regular {
         Some((least, inverse)) if least > square => {
-            (apply(&inverse, twist), Nearness { sigma: least.sqrt(), damping: 0.0, lost: [0.0; 6] })
+            (apply(&inverse, twist), Nearness { sigma: least.sqrt(), damping: 0.0 })
         }
         _ => damp(gram, twist, square),
     };
@@ -131,20 +128,19 @@ fn damp(gram: Matrix, twist: &[f64; 6], square: f64) -> ([f64; 6], Nearness) {
         per_push += shares[i] * directions[i][PUSH] * directions[i][PUSH];
     }
     let wanted = push.max(twist[PUSH].min(0.0)).min(twist[PUSH].max(0.0));
-    let more = (wanted - push) / (per_push + PUSH_SOFTENING);
-    let (mut back, mut lost) = ([0.0; 6], *twist);
+    let more = (wanted - push) / per_push.max(LEAST_SHARE);
+    let mut back = [0.0; 6];
     for i in 0..6 {
         along[i] += more * directions[i][PUSH];
         for j in 0..6 {
             back[j] += gains[i] * along[i] * directions[i][j];
-            lost[j] -= shares[i] * along[i] * directions[i][j];
         }
     }
     let (least, share) = eigenvalues
         .iter()
         .zip(shares)
         .fold((f64::INFINITY, 1.0_f64), |(least, share), (l, s)| (least.min(*l), share.min(s)));
-    (back, Nearness { sigma: least.sqrt(), damping: 1.0 - share, lost })
+    (back, Nearness { sigma: least.sqrt(), damping: 1.0 - share })
 }
 
 /// Returns the eigenvalues of a symmetric matrix, and one eigenvector for each: the cyclic method of Jacobi.

@@ -2,10 +2,12 @@
 //!
 //! 1. Twist and Jacobian are moved from the origin of the base to that of the sensor, along its axes (Ad of the inverse
 //!    pose, eq. 4). Damping depends on the frame, so it is done in the frame of the task.
-//! 2. [`damped::solve`]: an inverse that damps only near-singular directions.
+//! 2. [`damped::solve`]: an inverse that is exact but for nearly lost directions.
 //! 3. [`null_space::project`]: motion toward the posture, if there is one, that leaves the sensor exactly still.
-//! 4. [`joint_limits`]: within the speeds and the ranges of the joints the elbow gives way first, then the task is slowed
-//!    down and keeps its direction; the posture gets what the task leaves.
+//! 4. [`joint_limits::add_within`]: almost always the sum is within the limits of all joints, and is the answer.
+//!
+//! Otherwise [`Sharing`] decides: the elbow gives way first, then the task is slowed down in its direction. Where that
+//! would stop it although the arm can still follow in part, the velocities are those that lose the least of the twist.
 //!
 //! The state is scratch memory alone: each output depends only on the inputs of its step.
 
@@ -14,22 +16,38 @@ use tactflow_runtime::node::{
 };
 use tactflow_runtime::signal::{Jacobian, Joint, Joints, JointsShape, Pose, Scalar, ScalarShape, Twist, Unit};
 
-use super::joint_limits::{Elbow, interval};
+use super::damped::{self, Nearness};
+use super::joint_limits::{self, Elbow, interval};
 use super::joint_names::names;
-use super::{damped, null_space};
+use super::least_lost::{LeastLost, weighted};
+use super::null_space;
+use crate::motion::bounds::scale_into;
+
+/// A motion in the direction of the twist is the answer if it is at least this fraction of what can be followed of the
+/// twist in any direction [1].
+const STRAIGHT: f64 = 0.5;
+/// Up to this fraction it is not.
+const STOPPED: f64 = 0.2;
+/// From this damping on, the answer is the motion that loses the least [1].
+const DAMPED: f64 = 0.05;
+/// The damping of the motion that loses the least, as a fraction of the parameter: weaker, as the limits bound it too.
+const SOFTNESS: f64 = 0.2;
 
 /// Moves the arm: computes joint velocities for a twist, within the limits of the arm.
 ///
 /// Resolved motion rate control, as in section IV of the paper. Twist and Jacobian are moved to the origin of the
 /// sensor, where the task is defined. The arm follows the twist exactly while every singular value of the Jacobian is
-/// at least `damping`. Below, only the nearly lost directions are damped. `sigma` and `damping` tell how near a
-/// singularity is, and `lost` is the part of the twist that is not followed. What remains of a slide never becomes a
-/// push: the velocity along z of the sensor is between 0 and the wanted one, but for 0.5 % of the rest of the twist.
+/// at least `damping`. Below, only the nearly lost directions are damped: `sigma` and `damping` tell how near a
+/// singularity is.
 ///
 /// An arm with more than six joints can move its elbow while the sensor stays still. It drifts toward `posture`, at
-/// `posture_gain`. Where a joint cannot move as fast as the twist needs, the elbow gives way first. Only if that is
-/// not enough, the twist is slowed down as a whole and keeps its direction: `share` is the fraction of it that remains,
-/// 1 far from every limit. `limited` says which joints are the reason.
+/// `posture_gain`. Where a joint cannot move as fast as the twist needs, the elbow gives way first. If that is not
+/// enough, the twist is slowed down as a whole and keeps its direction. A direction that is blocked would stop the arm:
+/// it then moves so that it loses the least of the twist. In all this a slide never becomes a push: the velocity along z
+/// of the sensor is between 0 and the wanted one.
+///
+/// `share` is the fraction of the twist that is followed, 1 far from every limit, and `lost` is the rest of the twist.
+/// `limited` says which joints are the reason.
 ///
 /// This node decides how the joints share a motion within their speeds and ranges. It approaches a limit so slowly
 /// that the joint can brake with the acceleration that the arm states. It guarantees no limit: `joint_limit`, the
@@ -50,14 +68,15 @@ pub struct IkSink {
     /// With their limits.
     joints: Vec<Joint>,
     params: Params,
-    limit_gain: f64,
+    /// The inverse of the gain toward a limit [s].
+    limit_delay: f64,
 }
 
 /// Parameters of `ik_sink`.
 #[derive(Debug, Clone, Param)]
 pub struct Params {
     /// Singular values below this are damped, and no others.
-    #[param(unit = "1, m", above = 0.0, default = 0.05)]
+    #[param(unit = "1, m", above = 0.0, default = 0.02)]
     damping: f64,
     /// Posture that the arm drifts toward without moving the sensor, one entry for each joint; in m for
     /// a prismatic joint.
@@ -95,7 +114,7 @@ pub struct Outputs {
     /// Joint velocities; those of prismatic joints are in m/s.
     #[port(unit = "rad/s", robot = "R")]
     velocity: Out<Joints>,
-    /// Fraction of the twist that the joint limits leave. The drift toward the posture does not count.
+    /// Fraction of the twist that is followed, along its direction. The drift toward the posture does not count.
     #[port(unit = "1", frame = "_")]
     share: Out<Scalar>,
     /// 1 for a joint whose largest velocity the twist and the drift together exceed, -1 for its smallest one, else 0.
@@ -108,7 +127,7 @@ pub struct Outputs {
     /// Fraction of the weakest direction that is lost: 0 far from a singularity, 1 at it.
     #[port(unit = "1", frame = "_")]
     damping: Out<Scalar>,
-    /// The part of the twist that is lost near a singularity. It is no motion to be commanded.
+    /// The part of the twist that is not followed. It is no motion to be commanded.
     #[port(frame = "S")]
     lost: Out<Twist>,
 }
@@ -120,7 +139,16 @@ pub struct State {
     columns: Vec<[f64; 6]>,
     /// Motion toward the posture [rad/s].
     drift: Vec<f64>,
+    sharing: Sharing,
+}
+
+/// How the joints share a motion that exceeds a limit or is near a singularity.
+#[derive(Debug, Clone, Default)]
+struct Sharing {
     elbow: Elbow,
+    least_lost: LeastLost,
+    /// The velocities that lose the least [rad/s].
+    turned: Vec<f64>,
 }
 
 impl Node for IkSink {
@@ -140,16 +168,17 @@ impl Node for IkSink {
         setup.outputs.sigma = ScalarShape::of(Unit::ONE);
         setup.outputs.damping = ScalarShape::of(Unit::ONE).within(0.0, 1.0);
         let limit_gain = params.limit_gain.unwrap_or(max_limit_gain(setup.period).min(5.0));
-        Ok(Self { joints: shape.joints.clone(), params, limit_gain })
+        Ok(Self { joints: shape.joints.clone(), params, limit_delay: 1.0 / limit_gain })
     }
 
     fn state(&self) -> State {
         let count = self.joints.len();
-        State { columns: vec![[0.0; 6]; count], drift: vec![0.0; count], elbow: Elbow::new(count) }
+        let sharing = Sharing { elbow: Elbow::new(count), least_lost: LeastLost::new(count), turned: vec![0.0; count] };
+        State { columns: vec![[0.0; 6]; count], drift: vec![0.0; count], sharing }
     }
 
     fn step(&self, _: &Tick, inputs: Inputs<'_>, out: &mut Outputs, state: &mut State) {
-        let State { columns, drift, elbow } = state;
+        let State { columns, drift, sharing } = state;
         let velocity = &mut out.velocity.write().0;
         let q = &inputs.joints.0;
         // A copy, so that it stays in registers while the columns are written.
@@ -157,22 +186,99 @@ impl Node for IkSink {
         for (column, of_base) in columns.iter_mut().zip(&inputs.jacobian.0) {
             *column = at_sensor(&pose, of_base);
         }
-        let nearness = damped::solve(columns, &at_sensor(&pose, &inputs.twist), self.params.damping, velocity);
-        drift.fill(0.0);
+        let twist = at_sensor(&pose, &inputs.twist);
+        let nearness = damped::solve(columns, &twist, self.params.damping, velocity);
         if let Some(posture) = &self.params.posture {
             for ((drift, posture), q) in drift.iter_mut().zip(posture).zip(q) {
                 *drift = self.params.posture_gain * (posture - q);
             }
-            null_space::project(columns, &mut elbow.rows, drift);
+            null_space::project(columns, &mut sharing.elbow.rows, drift);
         }
-        for ((room, joint), q) in elbow.intervals.iter_mut().zip(&self.joints).zip(q) {
-            *room = interval(joint, *q, self.limit_gain);
+        let limited = &mut out.limited.write().0;
+        limited.fill(0.0);
+        let (mut share, mut lost) = (1.0, [0.0; 6]);
+        if nearness.damping > 0.0 || !joint_limits::add_within(&self.joints, q, self.limit_delay, velocity, drift) {
+            for (room, (joint, q)) in sharing.elbow.intervals.iter_mut().zip(self.joints.iter().zip(q)) {
+                *room = interval(joint, *q, self.limit_delay);
+            }
+            sharing.mark(velocity, drift, limited);
+            share = sharing.share_out(&self.joints, columns, &twist, nearness, self.params.damping, velocity);
+            sharing.elbow.add_drift(columns, velocity, drift);
+            lost = rest(columns, &twist, velocity);
         }
-        out.share.set(elbow.fit(columns, velocity, drift, &mut out.limited.write().0));
+        out.share.set(share);
         out.sigma.set(nearness.sigma);
         out.damping.set(nearness.damping);
-        out.lost.set(Twist(nearness.lost.into()));
+        out.lost.set(Twist(lost.into()));
     }
+}
+
+impl Sharing {
+    /// Sets `limited` for the joints whose interval the sum of the task and the drift leaves.
+    fn mark(&self, velocity: &[f64], drift: &[f64], limited: &mut [f64]) {
+        for (i, (min, max)) in self.elbow.intervals.iter().enumerate() {
+            let sum = velocity[i] + drift[i];
+            limited[i] = f64::from(i8::from(sum > *max) - i8::from(sum < *min));
+        }
+    }
+
+    /// Turns the `velocity` [rad/s] that the whole `twist` takes to the one within the intervals. Returns the fraction of
+    /// the twist that is followed.
+    ///
+    /// The result is a mean of the motion that keeps the direction and of the one that loses the least. Both are within
+    /// the intervals and never push, and both are convex conditions, so the mean is and does too.
+    #[cold]
+    fn share_out(
+        &mut self,
+        joints: &[Joint],
+        columns: &[[f64; 6]],
+        twist: &[f64; 6],
+        nearness: Nearness,
+        damping: f64,
+        velocity: &mut [f64],
+    ) -> f64 {
+        // As fast as the speeds of the joints allow: a twist that is too fast is no reason to turn it.
+        let pace = scale_into(velocity, joints.iter().map(|joint| (-joint.speed, joint.speed)));
+        for (turned, v) in self.turned.iter_mut().zip(&*velocity) {
+            *turned = pace * v;
+        }
+        let straight = self.elbow.keep_direction(columns, velocity);
+        if nearness.damping == 0.0 && straight >= STRAIGHT {
+            return straight;
+        }
+        let slower = twist.map(|x| pace * x);
+        self.least_lost.solve(columns, &slower, &self.elbow.intervals, SOFTNESS * damping, &mut self.turned);
+        let size = weighted(twist, twist);
+        let followed = |velocity: &[f64]| {
+            let lost = weighted(&rest(columns, twist, velocity), twist);
+            if size > 0.0 { ((size - lost) / size).clamp(0.0, 1.0) } else { 1.0 }
+        };
+        let most = followed(&self.turned);
+        let by_stop = smooth((STRAIGHT * most - straight) / ((STRAIGHT - STOPPED) * most).max(f64::MIN_POSITIVE));
+        let part = by_stop.max(smooth(nearness.damping / DAMPED));
+        for (v, turned) in velocity.iter_mut().zip(&self.turned) {
+            *v += part * (turned - *v);
+        }
+        self.elbow.clamp(velocity);
+        followed(velocity)
+    }
+}
+
+/// Returns the part of the twist that these velocities do not produce [m/s, rad/s].
+fn rest(columns: &[[f64; 6]], twist: &[f64; 6], velocity: &[f64]) -> [f64; 6] {
+    let mut rest = *twist;
+    for (column, v) in columns.iter().zip(velocity) {
+        for (rest, column) in rest.iter_mut().zip(column) {
+            *rest -= column * v;
+        }
+    }
+    rest
+}
+
+/// Rises from 0 at 0 to 1 at 1, with continuous slope.
+fn smooth(x: f64) -> f64 {
+    let x = x.clamp(0.0, 1.0);
+    x * x * (3.0 - 2.0 * x)
 }
 
 /// Moves a spatial twist in the base to the origin of the sensor, along the axes of the sensor: Ad(T^-1).

@@ -8,6 +8,7 @@ use tactflow_runtime::signal::Joint;
 
 use super::null_space::{self, Row};
 use crate::motion::bounds::scale_into;
+use crate::motion::braking::stopping_speed;
 
 /// Smallest and largest velocity of a joint [rad/s]. The first is at most 0, the second at least 0.
 pub type Interval = (f64, f64);
@@ -16,24 +17,32 @@ pub type Interval = (f64, f64);
 /// along a limit [1].
 const NEGLIGIBLE: f64 = 1e-9;
 
-/// Returns the smallest and the largest velocity of a joint at position `q`, for a `gain` [1/s].
+/// Returns the smallest and the largest velocity of a joint at position `q`.
 ///
-/// Toward a limit at distance d it is g d, with which the limit is approached exponentially and never crossed. That
-/// brakes with g² d, so from a distance where this exceeds the acceleration a of the joint, it is the speed that brakes
-/// with a: v² = 2 a d - a²/g². Both laws and their slopes meet at d = a/g². A joint outside its range can only move back.
+/// Toward a limit at distance d it is the v of v τ + v²/(2a) = d, with the `delay` τ [s] and the acceleration a of the
+/// joint. Near the limit that is d/τ, with which it is approached exponentially and never crossed. It brakes with
+/// v dv/dd = a v/(a τ + v), which is less than a at any distance. A joint outside its range can only move back.
 #[must_use]
-pub fn interval(joint: &Joint, q: f64, gain: f64) -> Interval {
-    let knee = joint.acceleration / gain;
-    let toward = |distance: f64| {
-        // Not `clamp`, which keeps a value that is not a number: such a position leaves no room.
-        let straight = (gain * distance).max(0.0);
-        if straight <= knee {
-            return straight.min(joint.speed);
-        }
-        let square = knee * (2.0 * straight - knee);
-        if square >= joint.speed * joint.speed { joint.speed } else { square.sqrt() }
-    };
+pub fn interval(joint: &Joint, q: f64, delay: f64) -> Interval {
+    let toward = |distance: f64| stopping_speed(distance, joint.acceleration, delay).min(joint.speed);
     (-toward(q - joint.lower), toward(joint.upper - q))
+}
+
+/// Adds `drift` to `velocity` [rad/s] if the sum is within the intervals of all joints at the positions `q`. Returns
+/// whether it is.
+///
+/// It asks whether a stop is possible, v τ + v²/(2a) <= d, which is cheaper than the largest speed from which one is.
+pub fn add_within(joints: &[Joint], q: &[f64], delay: f64, velocity: &mut [f64], drift: &[f64]) -> bool {
+    let mut is_within = true;
+    for (((joint, q), v), drift) in joints.iter().zip(q).zip(&*velocity).zip(drift) {
+        let sum = v + drift;
+        let (speed, room) = (sum.abs(), if sum > 0.0 { joint.upper - q } else { q - joint.lower });
+        is_within &= speed <= joint.speed && speed * (delay + speed / (2.0 * joint.acceleration)) <= room;
+    }
+    if is_within {
+        velocity.iter_mut().zip(drift).for_each(|(v, drift)| *v += drift);
+    }
+    is_within
 }
 
 /// Working memory for the joints of an arm.
@@ -44,7 +53,7 @@ pub struct Elbow {
     /// The interval of each joint.
     pub intervals: Vec<Interval>,
     /// A motion that leaves the sensor where it is [rad/s].
-    pub motion: Vec<f64>,
+    motion: Vec<f64>,
 }
 
 impl Elbow {
@@ -54,28 +63,11 @@ impl Elbow {
         Self { rows: vec![[0.0; 8]; count], intervals: vec![(0.0, 0.0); count], motion: vec![0.0; count] }
     }
 
-    /// Adds the motion `drift` [rad/s] of the null space to the `velocity` of the task, within the limits. Returns the
-    /// fraction of the task that is left.
+    /// Moves the `velocity` [rad/s] of the task into the intervals, with a motion of the elbow and, where this does not
+    /// suffice, slower. Returns the fraction of the task that is left.
     ///
-    /// `limited` gets 1 for a joint whose largest velocity the sum of both exceeds, -1 for the smallest, else 0.
     /// `columns` are those of the Jacobian at the sensor.
-    pub fn fit(&mut self, columns: &[[f64; 6]], velocity: &mut [f64], drift: &mut [f64], limited: &mut [f64]) -> f64 {
-        let mut is_within = true;
-        for (i, (min, max)) in self.intervals.iter().enumerate() {
-            let sum = velocity[i] + drift[i];
-            limited[i] = f64::from(i8::from(sum > *max) - i8::from(sum < *min));
-            is_within &= sum <= *max && sum >= *min;
-        }
-        if is_within {
-            velocity.iter_mut().zip(drift).for_each(|(velocity, drift)| *velocity += *drift);
-            return 1.0;
-        }
-        self.slow(columns, velocity, drift)
-    }
-
-    /// Slows the task down where the elbow alone does not suffice. Returns the fraction of the task that is left.
-    #[cold]
-    fn slow(&mut self, columns: &[[f64; 6]], velocity: &mut [f64], drift: &mut [f64]) -> f64 {
+    pub fn keep_direction(&mut self, columns: &[[f64; 6]], velocity: &mut [f64]) -> f64 {
         let slack = NEGLIGIBLE * velocity.iter().fold(0.0, |largest: f64, v| largest.max(v.abs()));
         let mut share = 1.0;
         if self.aside(columns, velocity, slack) {
@@ -90,17 +82,29 @@ impl Elbow {
             });
             // The smallest motion of the elbow within all intervals.
             let amount = 0.0_f64.max(least).min(most);
-            for ((v, motion), drift) in velocity.iter_mut().zip(&self.motion).zip(&mut *drift) {
+            for (v, motion) in velocity.iter_mut().zip(&self.motion) {
                 *v = share * *v + amount * motion;
-                *drift -= amount * motion;
             }
         }
         self.clamp(velocity);
-        let left = self.intervals.iter().zip(&*velocity).map(|((min, max), v)| (min - v, max - v));
-        let part = scale_into(drift, left);
-        velocity.iter_mut().zip(drift).for_each(|(velocity, drift)| *velocity += *drift * part);
-        self.clamp(velocity);
         share
+    }
+
+    /// Brings the motion of the elbow in `velocity` as near to `drift` as the intervals allow.
+    pub fn add_drift(&mut self, columns: &[[f64; 6]], velocity: &mut [f64], drift: &[f64]) {
+        for ((motion, v), drift) in self.motion.iter_mut().zip(&*velocity).zip(drift) {
+            *motion = drift - v;
+        }
+        null_space::project(columns, &mut self.rows, &mut self.motion);
+        let left = self.intervals.iter().zip(&*velocity).map(|((min, max), v)| (min - v, max - v));
+        let part = scale_into(&self.motion, left);
+        velocity.iter_mut().zip(&self.motion).for_each(|(velocity, motion)| *velocity += motion * part);
+        self.clamp(velocity);
+    }
+
+    /// Brings each velocity into its interval.
+    pub fn clamp(&self, velocity: &mut [f64]) {
+        velocity.iter_mut().zip(&self.intervals).for_each(|(v, (min, max))| *v = v.clamp(*min, *max));
     }
 
     /// Sets `motion` to the unit motion of the elbow that leads toward the intervals, or to zero if none does. Returns
@@ -120,10 +124,6 @@ impl Elbow {
         let scale = if inside > NEGLIGIBLE * NEGLIGIBLE * outside { 1.0 / inside.sqrt() } else { 0.0 };
         self.motion.iter_mut().for_each(|motion| *motion *= scale);
         true
-    }
-
-    fn clamp(&self, velocity: &mut [f64]) {
-        velocity.iter_mut().zip(&self.intervals).for_each(|(v, (min, max))| *v = v.clamp(*min, *max));
     }
 }
 

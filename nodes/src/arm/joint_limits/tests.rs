@@ -18,14 +18,14 @@ fn columns(more: &[[f64; 2]]) -> Vec<[f64; 6]> {
 struct Fitted {
     share: f64,
     velocity: Vec<f64>,
-    limited: Vec<f64>,
 }
 
 fn fit(columns: &[[f64; 6]], intervals: &[Interval], velocity: &[f64], drift: &[f64]) -> Fitted {
     let mut elbow = Elbow { intervals: intervals.to_vec(), ..Elbow::new(columns.len()) };
-    let (mut velocity, mut limited) = (velocity.to_vec(), vec![f64::NAN; columns.len()]);
-    let share = elbow.fit(columns, &mut velocity, &mut drift.to_vec(), &mut limited);
-    Fitted { share, velocity, limited }
+    let mut velocity = velocity.to_vec();
+    let share = elbow.keep_direction(columns, &mut velocity);
+    elbow.add_drift(columns, &mut velocity, drift);
+    Fitted { share, velocity }
 }
 
 fn moved(columns: &[[f64; 6]], velocity: &[f64]) -> DVector<f64> {
@@ -45,25 +45,47 @@ fn the_interval_of_a_joint_depends_on_its_position() {
         (f64::NAN, (0.0, 0.0), "not a number"),
     ];
     for (q, (min, max), what) in cases {
-        let got = interval(&unknown, q, 4.0);
+        let got = interval(&unknown, q, 0.25);
         assert!((got.0 - min).abs() < 1e-12 && (got.1 - max).abs() < 1e-12, "{what}: {got:?}");
     }
-    // With 4 rad/s² and a gain of 4/s the laws meet at 0.25 rad and 1 rad/s.
+    // A stop from v takes v τ + v²/(2a) = v/4 + v²/8 with 4 rad/s².
     let slow = Joint { acceleration: 4.0, ..unknown };
-    for (distance, speed) in [(0.1, 0.4), (0.25, 1.0), (0.625, 2.0), (1.25, 3.0), (1.3, 3.0)] {
-        let got = interval(&slow, 2.0 - distance, 4.0).1;
+    for (distance, speed) in [(0.12, 0.4), (0.375, 1.0), (1.0, 2.0), (1.875, 3.0), (2.5, 3.0)] {
+        let got = interval(&slow, 2.0 - distance, 0.25).1;
         assert!((got - speed).abs() < 1e-12, "at {distance}: {got}");
     }
 }
 
+#[test]
+fn a_sum_is_added_if_each_joint_can_stop() {
+    // A stop from 1 rad/s takes 0.25 rad + 0.125 rad.
+    let joints = [Joint { acceleration: 4.0, ..joint(-1.0, 1.0, 1.5) }, joint(-9.0, 9.0, 2.0)];
+    let cases = [
+        ([0.62, 0.0], [0.5, 0.0], [0.5, 0.0], true, "there is room"),
+        ([0.63, 0.0], [0.5, 0.0], [0.5, 0.0], false, "there is none"),
+        ([-0.63, 0.0], [-0.5, 0.0], [-0.5, 0.0], false, "nor at the other end"),
+        ([0.63, 0.0], [-0.5, 0.0], [-0.5, 0.0], true, "away from the limit"),
+        ([1.5, 0.0], [-1.0, 0.0], [0.0, 0.0], true, "from outside"),
+        ([0.0, 0.0], [1.0, 0.0], [0.6, 0.0], false, "too fast"),
+        ([0.0, 0.0], [0.0, 1.0], [0.0, 1.0], true, "as fast as possible"),
+        ([f64::NAN, 0.0], [0.1, 0.0], [0.0, 0.0], false, "not a number"),
+    ];
+    for (q, mut velocity, drift, is_within, what) in cases {
+        let before = velocity;
+        assert_eq!(add_within(&joints, &q, 0.25, &mut velocity, &drift), is_within, "{what}");
+        let part = f64::from(u8::from(is_within));
+        assert_eq!(velocity, [before[0] + part * drift[0], before[1] + part * drift[1]], "{what}");
+    }
+}
+
 proptest! {
-    // The speed falls with v dv/dd, whose largest value is the acceleration.
+    // The speed falls with v dv/dd, which is below the acceleration.
     #[test]
     fn a_joint_can_brake_as_its_interval_asks(
         distance in 1e-3..3.0f64, gain in 0.5..20.0f64, acceleration in 0.5..40.0f64,
     ) {
         let joint = Joint { acceleration, ..joint(-9.0, 9.0, 50.0) };
-        let speed = |distance: f64| interval(&joint, 9.0 - distance, gain).1;
+        let speed = |distance: f64| interval(&joint, 9.0 - distance, 1.0 / gain).1;
         let step = 1e-6;
         let braking = speed(distance) * (speed(distance + step) - speed(distance - step)) / (2.0 * step);
         prop_assert!(braking <= acceleration * (1.0 + 1e-6), "{} at {}", braking, distance);
@@ -74,8 +96,13 @@ proptest! {
 #[test]
 fn a_motion_within_all_intervals_is_not_changed() {
     let fitted = fit(&columns(&[[1.0, 0.0]]), &[(-1.0, 1.0); 7], &[0.5; 7], &[0.5, 0.0, 0.0, 0.0, 0.0, 0.0, -0.5]);
-    assert_eq!((fitted.share, fitted.limited), (1.0, vec![0.0; 7]));
-    assert_eq!(fitted.velocity, [1.0, 0.5, 0.5, 0.5, 0.5, 0.5, 0.0]);
+    assert_eq!(fitted.share, 1.0);
+    let wanted = [1.0, 0.5, 0.5, 0.5, 0.5, 0.5, 0.0];
+    assert!(
+        fitted.velocity.iter().zip(wanted).all(|(got, wanted)| (got - wanted).abs() < 1e-15),
+        "{:?}",
+        fitted.velocity
+    );
 }
 
 #[test]
@@ -86,7 +113,6 @@ fn the_elbow_gives_way_before_the_task() {
     intervals[0] = (-1.0, 0.0);
     let fitted = fit(&columns, &intervals, &[0.5, 0.2, 0.0, 0.0, 0.0, 0.0, 0.3], &[0.0; 7]);
     assert_eq!(fitted.share, 1.0);
-    assert_eq!(fitted.limited, [1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0]);
     let wanted = [0.0, 0.2, 0.0, 0.0, 0.0, 0.0, 0.8];
     assert!(
         fitted.velocity.iter().zip(wanted).all(|(got, wanted)| (got - wanted).abs() < 1e-9),
@@ -114,7 +140,6 @@ fn an_arm_without_an_elbow_is_slowed_down_as_a_whole() {
     let fitted = fit(&columns(&[]), &intervals, &[2.0, -1.0, 0.0, 0.0, 0.0, 0.0], &[0.0; 6]);
     assert!((fitted.share - 0.5).abs() < 1e-9);
     assert!((fitted.velocity[0] - 1.0).abs() < 1e-9 && (fitted.velocity[1] + 0.5).abs() < 1e-9);
-    assert_eq!(fitted.limited, [1.0, 0.0, 0.0, 0.0, 0.0, 0.0]);
 }
 
 #[test]
@@ -145,14 +170,15 @@ proptest! {
         }
         let off = moved(&columns, &fitted.velocity) - moved(&columns, &task) * fitted.share;
         prop_assert!(off.norm() < 1e-8, "the direction is kept: {}", off);
-        // No amount allows a larger share: at each of many, the share that the joints allow alone.
+        // No amount of the elbow's motion allows a larger share. At one amount the shares that a joint allows are an
+        // interval, and so are those that all joints allow.
         let allowed = |amount: f64| {
-            (0..7).fold(1.0_f64, |share, i| {
-                let room = if task[i] > 0.0 { intervals[i].1 - amount * elbow[i] } else { amount * elbow[i] - intervals[i].0 };
-                let other = if task[i] > 0.0 { amount * elbow[i] - intervals[i].0 } else { intervals[i].1 - amount * elbow[i] };
-                // A joint that the elbow moves beyond its other end needs the task to bring it back.
-                if room < 0.0 || -other > task[i].abs() * share { f64::NEG_INFINITY } else { share.min(room / task[i].abs()) }
-            })
+            let (mut least, mut most) = (0.0_f64, 1.0_f64);
+            for (i, (min, max)) in intervals.iter().enumerate() {
+                let ends = [(min - amount * elbow[i]) / task[i], (max - amount * elbow[i]) / task[i]];
+                (least, most) = (least.max(ends[0].min(ends[1])), most.min(ends[0].max(ends[1])));
+            }
+            if least <= most { most } else { 0.0 }
         };
         for i in -400..=400 {
             let amount = f64::from(i) * 0.01;
