@@ -25,9 +25,9 @@ use crate::motion::bounds::scale_into;
 
 /// A motion in the direction of the twist is the answer if it is at least this fraction of what can be followed of the
 /// twist in any direction [1].
-const STRAIGHT: f64 = 0.5;
+const STRAIGHT: f64 = 0.7;
 /// Up to this fraction it is not.
-const STOPPED: f64 = 0.2;
+const STOPPED: f64 = 0.4;
 /// From this damping on, the answer is the motion that loses the least [1].
 const DAMPED: f64 = 0.05;
 /// The damping of the motion that loses the least, as a fraction of the parameter: weaker, as the limits bound it too.
@@ -202,9 +202,10 @@ impl Node for IkSink {
                 *room = interval(joint, *q, self.limit_delay);
             }
             sharing.mark(velocity, drift, limited);
-            share = sharing.share_out(&self.joints, columns, &twist, nearness, self.params.damping, velocity);
+            sharing.share_out(&self.joints, columns, &twist, nearness, self.params.damping, velocity);
             sharing.elbow.add_drift(columns, velocity, drift);
             lost = rest(columns, &twist, velocity);
+            share = followed(&twist, &lost);
         }
         out.share.set(share);
         out.sigma.set(nearness.sigma);
@@ -222,8 +223,7 @@ impl Sharing {
         }
     }
 
-    /// Turns the `velocity` [rad/s] that the whole `twist` takes to the one within the intervals. Returns the fraction of
-    /// the twist that is followed.
+    /// Turns the `velocity` [rad/s] that the whole `twist` takes to the one within the intervals.
     ///
     /// The result is a mean of the motion that keeps the direction and of the one that loses the least. Both are within
     /// the intervals and never push, and both are convex conditions, so the mean is and does too.
@@ -236,7 +236,7 @@ impl Sharing {
         nearness: Nearness,
         damping: f64,
         velocity: &mut [f64],
-    ) -> f64 {
+    ) {
         // As fast as the speeds of the joints allow: a twist that is too fast is no reason to turn it.
         let pace = scale_into(velocity, joints.iter().map(|joint| (-joint.speed, joint.speed)));
         for (turned, v) in self.turned.iter_mut().zip(&*velocity) {
@@ -244,23 +244,17 @@ impl Sharing {
         }
         let straight = self.elbow.keep_direction(columns, velocity);
         if nearness.damping == 0.0 && straight >= STRAIGHT {
-            return straight;
+            return;
         }
         let slower = twist.map(|x| pace * x);
         self.least_lost.solve(columns, &slower, &self.elbow.intervals, SOFTNESS * damping, &mut self.turned);
-        let size = weighted(twist, twist);
-        let followed = |velocity: &[f64]| {
-            let lost = weighted(&rest(columns, twist, velocity), twist);
-            if size > 0.0 { ((size - lost) / size).clamp(0.0, 1.0) } else { 1.0 }
-        };
-        let most = followed(&self.turned);
+        let most = followed(twist, &rest(columns, twist, &self.turned));
         let by_stop = smooth((STRAIGHT * most - straight) / ((STRAIGHT - STOPPED) * most).max(f64::MIN_POSITIVE));
         let part = by_stop.max(smooth(nearness.damping / DAMPED));
         for (v, turned) in velocity.iter_mut().zip(&self.turned) {
             *v += part * (turned - *v);
         }
         self.elbow.clamp(velocity);
-        followed(velocity)
     }
 }
 
@@ -273,6 +267,12 @@ fn rest(columns: &[[f64; 6]], twist: &[f64; 6], velocity: &[f64]) -> [f64; 6] {
         }
     }
     rest
+}
+
+/// Returns the fraction of a twist that is followed along its direction, if this part of it is lost.
+fn followed(twist: &[f64; 6], lost: &[f64; 6]) -> f64 {
+    let size = weighted(twist, twist);
+    if size > 0.0 { (1.0 - weighted(lost, twist) / size).clamp(0.0, 1.0) } else { 1.0 }
 }
 
 /// Rises from 0 at 0 to 1 at 1, with continuous slope.
