@@ -74,18 +74,19 @@ fn gram(columns: &[[f64; 6]]) -> Matrix {
 fn inverse(mut m: Matrix, least: f64) -> Option<Matrix> {
     for k in 0..6 {
         let pivot = m[k][k];
-        // Not `<`: a pivot that is not a number is no proof either.
-        if !(pivot > least) {
+        // A pivot that is not a number is no proof either.
+        let is_proof = pivot > least;
+        if !is_proof {
             return None;
         }
         let inverse = 1.0 / pivot;
         m[k][k] = 1.0;
         let row = m[k].map(|x| x * inverse);
-        for i in 0..6 {
-            let factor = m[i][k];
-            m[i][k] = 0.0;
+        for other in &mut m {
+            let factor = other[k];
+            other[k] = 0.0;
             for j in 0..6 {
-                m[i][j] -= factor * row[j];
+                other[j] -= factor * row[j];
             }
         }
         m[k] = row;

@@ -6,7 +6,7 @@
 //! 3. [`null_space::project`]: motion toward the posture, if there is one, that leaves the sensor exactly still.
 //! 4. [`joint_limits::add_within`]: almost always the sum is within the limits of all joints, and is the answer.
 //!
-//! Otherwise [`Sharing`] decides: the elbow gives way first, then the task is slowed down in its direction. Where that
+//! Otherwise `Sharing` decides: the elbow gives way first, then the task is slowed down in its direction. Where that
 //! would stop it although the arm can still follow in part, the velocities are those that lose the least of the twist.
 //!
 //! The state is scratch memory alone: each output depends only on the inputs of its step.
