@@ -270,11 +270,11 @@ impl Fused {
         for (to, column) in self.at_sensor.iter_mut().zip(&self.columns) {
             *to = at_sensor(column);
         }
-        damped::solve(&self.at_sensor, &at_sensor(&spatial), 0.05, out);
-        joint_limits::limit(&self.joints, q, 5.0, out);
+        let nearness = damped::solve(&self.at_sensor, &at_sensor(&spatial), 0.02, out);
         let mut drift: [f64; 7] = std::array::from_fn(|i| 0.5 * (POSTURE[i] - q[i]));
         null_space::project(&self.at_sensor, &mut self.rows, &mut drift);
-        joint_limits::add_within(&self.joints, q, 5.0, out, &drift);
+        let is_within = joint_limits::add_within(&self.joints, q, 0.2, out, &drift);
+        assert!(is_within && nearness.damping == 0.0, "the task stays far from limits and singularities");
     }
 
     /// From the region to the twist of the sensor (eqs. 1-3 and 5).
