@@ -114,6 +114,7 @@ pub fn catalogue() -> Catalogue {
         .node::<limits::lost_contact::LostContact>()
         .node::<limits::contact_limit::ContactLimit>()
         .node::<limits::second_contact_limit::SecondContactLimit>()
+        .node::<limits::wrench_limit::WrenchLimit>()
         .node::<limits::workspace_limit::WorkspaceLimit>()
         .node::<limits::blind_limit::BlindLimit>()
         .node::<limits::twist_limit::TwistLimit>()

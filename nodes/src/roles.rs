@@ -58,7 +58,7 @@ pub fn force_sensor() -> RoleType {
         name: "force_sensor".into(),
         summary: "a sensor of the force and the torque on the tool of an arm".into(),
         outputs: vec![
-            PortSpec::new("wrench", WRENCH, Kind::Features, &["_", "self"]),
+            PortSpec::new("wrench", WRENCH, Kind::Features, &["_", "self"]).of_quantity("wrench"),
             force("fx", "Force along x of the tip [N]."),
             force("fy", "Force along y of the tip [N]."),
             force("fz", "Force along z of the tip [N]."),
@@ -66,6 +66,8 @@ pub fn force_sensor() -> RoleType {
             torque("ty", "Torque about y of the tip [N m]."),
             torque("tz", "Torque about z of the tip [N m]."),
         ],
+        arm_limits: vec!["wrench".into()],
+        joined_as: Some("force".into()),
         ..RoleType::default()
     }
 }
@@ -156,11 +158,13 @@ const COMMON_NOISE: &str = "Standard deviation of the pressure due to the noise 
 const OWN_NOISE: &str =
     "Standard deviation of the pressure due to the own noise of each tactel; absent without contact [N/tactel].";
 
-/// What every command of an arm must have crossed, in the order in which a motion does.
-const LIMITS: [&str; 11] = [
+/// What every command of an arm must have crossed, in the order in which a motion does; `wrench` if a sensor of the
+/// wrench is on the arm.
+const LIMITS: [&str; 12] = [
     "bumpless",
     "force",
     "peak",
+    "wrench",
     "workspace",
     "blind",
     "speed",

@@ -167,7 +167,7 @@ fn a_limiter_says_what_it_does_and_no_mode_can_set_it() {
             assert!(live.is_empty(), "a mode could set {live:?} of `{}`", spec.name);
         }
     }
-    assert_eq!(limiters, 8);
+    assert_eq!(limiters, 9);
     // Whatever an arm asks for, some node holds.
     for limit in catalogue.roles().iter().flat_map(|role| &role.limits) {
         let is_held = catalogue.nodes().iter().any(|node| node.spec().limits.holds.contains(&&**limit));

@@ -101,3 +101,4 @@ mod view;
 mod warnings;
 mod windows;
 mod words;
+mod wrench;

@@ -1,6 +1,7 @@
 //! From a twist to joint velocities (paper section IV, eq. 4): kinematics from a robot's model, and the sink.
 
 pub mod arm_state;
+pub mod capsule;
 pub mod chain;
 pub mod compose_poses;
 pub mod contact_point;

@@ -20,7 +20,7 @@ pub mod start;
 pub mod stream;
 #[cfg(feature = "drivers")]
 pub mod ur;
-#[cfg(feature = "drivers")]
+#[cfg_attr(not(feature = "drivers"), expect(dead_code, reason = "only drivers compensate a weight and lose a sensor"))]
 pub(crate) mod wrench;
 
 #[cfg(test)]

@@ -86,7 +86,7 @@ impl Node for Bumpless {
     const LIMITS: Limits = Limits {
         through: Some("twist"),
         holds: &["bumpless"],
-        breaks: &["force", "peak", "workspace", "blind", "speed", "acceleration"],
+        breaks: &["force", "peak", "wrench", "workspace", "blind", "speed", "acceleration"],
         ..Limits::NONE
     };
 

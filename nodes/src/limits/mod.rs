@@ -12,6 +12,7 @@ pub mod lost_contact;
 pub mod second_contact_limit;
 pub mod twist_limit;
 pub mod workspace_limit;
+pub mod wrench_limit;
 
 #[cfg(test)]
 mod tests;

@@ -5,6 +5,7 @@
 //! |---|---|
 //! | [`shape`], [`object`] | the objects |
 //! | [`foam`], [`bristle`], [`contact`], [`imprint`] | the pad: forces on each tactel |
+//! | [`housing`] | what else of the tool touches objects |
 //! | [`readout`], [`frames`] | the electronics: counts from forces, and when an image is available |
 //! | [`joints`] | the arm |
 //! | [`pad_model`], [`arm_model`], [`steps`] | parameters of pad and arm, and what can be simulated of them |
@@ -22,6 +23,7 @@ pub mod bristle;
 pub mod contact;
 pub mod foam;
 pub mod frames;
+pub mod housing;
 pub mod imprint;
 pub mod joints;
 pub mod object;

@@ -143,6 +143,14 @@ impl Geometry {
         }
     }
 
+    /// Returns the distance from a point to the surface, which is negative inside [m], and the outward normal there.
+    #[must_use]
+    pub fn signed(&self, point: Vec3) -> (f64, Vec3) {
+        let near = self.solid().project_local_point(point, false);
+        let (way, sign) = (point - near.point, if near.is_inside { -1.0 } else { 1.0 });
+        (sign * way.length(), sign * way.normalize_or_zero())
+    }
+
     /// Returns the line of the object nearest to a point, or `None` if the object has no line.
     #[must_use]
     pub fn line(&self, point: Vec3) -> Option<ObjectLine> {

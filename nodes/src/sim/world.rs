@@ -6,6 +6,7 @@ use tactflow_runtime::signal::ImageShape;
 
 use super::contact::{Contact, Wrench};
 use super::foam::Foam;
+use super::housing::Housing;
 use super::imprint::Imprint;
 use super::joints::SimArm;
 use super::object::Object;
@@ -16,6 +17,9 @@ pub struct World {
     pub(super) arm: SimArm,
     pub(super) objects: Vec<Object>,
     pub(super) contact: Contact,
+    housing: Option<Housing>,
+    /// Wrench on the pad and its housing about the origin of the pad, in the base, as of the last step.
+    wrench: Wrench,
     pub(super) imprint: Imprint,
     pub(super) shape: ImageShape,
     /// Axes of the sensor at the start, in the base.
@@ -44,8 +48,37 @@ impl World {
         let loads = vec![Vec3::ZERO; objects.len()];
         let from = arm.motion().pose;
         let survey = objects.iter().enumerate().find_map(|(i, object)| Some((i, Survey::new(object, from)?)));
-        let (axes, push) = (from.rotation, Vec3::ZERO);
-        Self { survey, arm, objects, contact, imprint, shape, axes, push, loads, time: 0.0, max_step, is_stale: true }
+        Self {
+            survey,
+            arm,
+            objects,
+            contact,
+            housing: None,
+            wrench: Wrench::default(),
+            imprint,
+            shape,
+            axes: from.rotation,
+            push: Vec3::ZERO,
+            loads,
+            time: 0.0,
+            max_step,
+            is_stale: true,
+        }
+    }
+
+    /// Adds the housing of the pad.
+    #[must_use]
+    pub fn with_housing(self, housing: Option<Housing>) -> Self {
+        Self { housing, ..self }
+    }
+
+    /// Returns the force and the torque on the pad, its housing and a hand at the sensor about the origin of the pad, in
+    /// its axes [N, N m].
+    #[must_use]
+    pub fn wrench(&self) -> [f64; 6] {
+        let pose = self.arm.motion().pose;
+        let [force, moment] = [self.wrench.force, self.wrench.moment].map(|v| pose.inverse_transform_vector(v));
+        [force.x, force.y, force.z, moment.x, moment.y, moment.z]
     }
 
     /// Advances to `time` [s], with the equilibrium of the joints moving at `velocity` [rad/s].
@@ -57,9 +90,14 @@ impl World {
             for (object, load) in self.objects.iter_mut().zip(&self.loads) {
                 object.step(now, dt, *load);
             }
-            self.contact.step(dt, &self.arm.motion(), &self.objects, &mut self.loads);
-            let Wrench { force, moment } = self.contact.wrench;
-            self.arm.step(dt, velocity, &Wrench { force: force + self.push, moment });
+            let pad = self.arm.motion();
+            self.contact.step(dt, &pad, &self.objects, &mut self.loads);
+            self.wrench = self.contact.wrench;
+            if let Some(housing) = &self.housing {
+                housing.press(&pad, &self.objects, &mut self.wrench, &mut self.loads);
+            }
+            self.wrench.force += self.push;
+            self.arm.step(dt, velocity, &self.wrench);
         }
         self.time = time;
         self.is_stale = true;

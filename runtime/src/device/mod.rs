@@ -49,6 +49,10 @@ pub struct RoleType {
     /// The limits that every command must pass, in the order in which a motion passes them. They are names in the
     /// `holds` of nodes; see [`Limits`](crate::node::Limits).
     pub limits: Vec<Cow<'static, str>>,
+    /// Of a sensor: those limits of the arm that carries it which the commands must pass only because of the sensor.
+    pub arm_limits: Vec<Cow<'static, str>>,
+    /// The name under which a bench adds a role of this type to every task: a task need not declare it.
+    pub joined_as: Option<Cow<'static, str>>,
     /// Whether only scenarios and recordings may read it: a simulation knows its values, and no sensor does. A bench
     /// binds it under its name, or under one that ends with the last word of it, and no task declares it.
     pub is_observed: bool,

@@ -25,6 +25,8 @@ pub fn compile(catalogue: &Catalogue, request: &Request) -> Result<Compiled, Rep
 
 /// Compiles a graph with a loader that may have read other files before.
 pub(crate) fn compile_in(mut loader: Loader, catalogue: &Catalogue, request: &Request) -> Result<Compiled, Report> {
+    let joined = catalogue.roles().iter().filter_map(|role| Some((role.joined_as.as_deref()?, &*role.name)));
+    loader.joined = joined.map(|(name, kind)| (name.to_owned(), kind.to_owned())).collect();
     let mut flat = loader.load(request);
     let Loader { mut sources, mut diagnostics, mut measured, has_wrong_roles, .. } = loader;
     let is_unreadable = diagnostics

@@ -76,7 +76,7 @@ const NODES: &[(&str, &[&str])] = &[
     ("calibration", &["motion", "recordings", "calibration"]),
     ("touch", &["motion", "usual", "calibration", "touch"]),
     ("servo", &["motion", "usual", "servo"]),
-    ("limits", &["motion", "usual", "limits"]),
+    ("limits", &["arm", "motion", "usual", "limits"]),
     ("arm", &["motion", "usual"]),
     ("flow", &["flow"]),
     ("devices", &["arm", "builtin", "motion", "recordings", "usual", "devices"]),

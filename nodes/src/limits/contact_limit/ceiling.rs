@@ -39,7 +39,7 @@ impl Ceiling {
 
     /// Returns the same ceiling with a spring in series, of this compliance [m per unit of the image].
     #[must_use]
-    pub(super) fn in_series(self, compliance: f64) -> Self {
+    pub(in crate::limits) fn in_series(self, compliance: f64) -> Self {
         Self { stiffness: (self.stiffness.recip() + compliance).recip(), ..self }
     }
 

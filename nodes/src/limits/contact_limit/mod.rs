@@ -147,7 +147,7 @@ impl Node for ContactLimit {
     const LIMITS: Limits = Limits {
         through: Some("twist"),
         holds: &["force", "peak"],
-        breaks: &["workspace", "blind", "speed", "acceleration"],
+        breaks: &["wrench", "workspace", "blind", "speed", "acceleration"],
         guards: Some("image"),
         ..Limits::NONE
     };

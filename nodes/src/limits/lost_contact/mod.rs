@@ -134,7 +134,7 @@ impl Node for LostContact {
 
     const LIMITS: Limits = Limits {
         through: Some("twist"),
-        breaks: &["force", "peak", "workspace", "blind", "speed", "acceleration"],
+        breaks: &["force", "peak", "wrench", "workspace", "blind", "speed", "acceleration"],
         ..Limits::NONE
     };
 

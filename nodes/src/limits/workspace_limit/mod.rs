@@ -2,7 +2,7 @@
 //!
 //! At the distance d from a face or a plane the origin moves toward it at most at the speed from which it can stop:
 //! v τ + v²/(2a) <= d. τ is twice the graph's `max_gap_ms`, because a command acts one tick after its inputs were read.
-//! At a face and beyond it only the way back is free. One factor scales the whole twist, so its direction stays.
+//! At a face and beyond it only the way back is free. Of a capsule, both ends count, as balls before the planes. One factor scales the whole twist, so its direction stays.
 
 mod planes;
 
@@ -16,6 +16,8 @@ use tactflow_runtime::source::Code;
 use planes::Rows;
 
 use super::{fraction, max_age};
+use crate::arm::capsule::{Capsule, Tool};
+use crate::arm::mount::Mount;
 use crate::motion::bounds::{countable, scale_within};
 use crate::motion::braking::stopping_speed;
 use crate::usual::{USUAL_M_PER_S2, USUAL_REACH_M};
@@ -36,7 +38,8 @@ pub use planes::Plane;
 /// then passes a face or a plane by at most its maximum speed times the time in which the whole motion can be
 /// reversed: 8 mm with 0.05 m/s, 0.8 rad/s, 1 m/s² and 10 rad/s². The worst case found at 250 Hz is 2.3 mm.
 ///
-/// It checks the sensor's origin and no other point: a large sensor or holder needs a smaller box. When the pose is
+/// In the box it checks the sensor's origin and no other point: a large sensor or holder needs a smaller box. Before the
+/// planes it checks the whole `capsule` as well, which is around the tool in the frame of the tip. When the pose is
 /// older than `max_age_ms` the output is absent.
 ///
 /// ```toml
@@ -54,6 +57,8 @@ pub use planes::Plane;
 pub struct WorkspaceLimit {
     params: Params,
     planes: Box<[Plane]>,
+    /// The tool, if it stays before the planes too.
+    tool: Option<Tool>,
     /// Maximum age of the pose [ns].
     max_age: i64,
 }
@@ -71,6 +76,11 @@ pub struct Params {
     /// points to the free side.
     #[param(unit = "1, 1, 1, m", default = Rows::default())]
     keep_out: Rows,
+    /// Pose of the sensor on the tip, for the capsule.
+    #[param(default = Mount::NONE)]
+    mount: Mount,
+    /// The tool as a capsule in the frame of the tip, which stays before the planes too.
+    capsule: Option<Capsule>,
     /// Deceleration with which the sensor can stop before a face.
     #[param(unit = "m/s2", above = 0.0, usual = ..=USUAL_M_PER_S2)]
     deceleration_m_per_s2: f64,
@@ -133,7 +143,8 @@ impl Node for WorkspaceLimit {
         }
         setup.outputs.workspace = fraction();
         let max_age = max_age(params.max_age_ms, setup.sample_period("pose"));
-        Ok(Self { params, planes, max_age })
+        let tool = params.capsule.as_ref().map(|capsule| Tool::new(Some(capsule), &params.mount));
+        Ok(Self { params, planes, tool, max_age })
     }
 
     fn step(&self, tick: &Tick, inputs: Inputs<'_>, out: &mut Outputs, (): &mut ()) {
@@ -146,7 +157,13 @@ impl Node for WorkspaceLimit {
         let delay = 2.0 * tick.max_gap;
         let mut scale = scale(&velocity, &position, [min, max], deceleration, delay);
         if !self.planes.is_empty() {
-            scale = scale.min(planes::scale(&self.planes, &velocity, &position, deceleration, delay));
+            scale = scale.min(planes::scale(&self.planes, &velocity, (&position, 0.0), deceleration, delay));
+            // Both balls at the ends of a capsule bound all of it.
+            for (end, radius) in self.tool.iter().flat_map(|tool| tool.ends.map(|end| (end, tool.radius))) {
+                let velocity = pose.rotation * Tool::velocity(&twist, &end);
+                let ball = (&(position + pose.rotation * end), radius);
+                scale = scale.min(planes::scale(&self.planes, &velocity, ball, deceleration, delay));
+            }
         }
         out.twist.set(Twist(twist.0 * scale));
         out.workspace.set(scale);

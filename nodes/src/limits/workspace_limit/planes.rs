@@ -122,18 +122,18 @@ pub(super) fn unusual_distances(rows: &Rows) -> impl Iterator<Item = Mistake> {
 
 /// Returns the largest factor up to 1 with which a velocity can still be stopped before each plane.
 ///
-/// `position` is in [m], the velocity in [m/s], `deceleration` in [m/s²]. The velocity stays the same for `delay` [s]
-/// before it decreases.
+/// It is the velocity [m/s] of the centre of a ball at `position` with that `radius` [m]. `deceleration` is in [m/s²].
+/// The velocity stays the same for `delay` [s] before it decreases.
 pub(super) fn scale(
     planes: &[Plane],
     velocity: &Vector3<f64>,
-    position: &Vector3<f64>,
+    (position, radius): (&Vector3<f64>, f64),
     deceleration: f64,
     delay: f64,
 ) -> f64 {
     let toward = |plane: &Plane| {
         let v = (-plane.normal.dot(velocity)).max(0.0);
-        (v, stopping_speed(plane.room(position), deceleration, delay))
+        (v, stopping_speed(plane.room(position) - radius, deceleration, delay))
     };
     scale_within(velocity.norm(), planes.iter().map(toward))
 }

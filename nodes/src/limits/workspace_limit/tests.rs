@@ -176,3 +176,31 @@ proptest! {
         }
     }
 }
+
+#[test]
+fn the_whole_capsule_stays_before_a_plane() {
+    // The sensor is 0.1 m in front of the tip, and the tool reaches 0.05 m behind the tip. Its radius is 0.02 m.
+    let tool = "mount = { xyz = [0.0, 0.0, 0.1] }\n\
+                capsule = { ends_m = [[0.0, 0.0, -0.05], [0.0, 0.0, 0.1]], radius_m = 0.02 }";
+    let params = format!("{BOX}\nkeep_out = [[0, 0, 1, -0.1]]\n{tool}");
+    let mut rig = rig::<WorkspaceLimit>(&params, &[("pose", PoseShape::default().into())]).unwrap();
+    // The far end is 0.15 m behind the sensor: with its radius it touches the plane when the sensor is at z = 0.07.
+    for room in [0.001, 0.02] {
+        let v = pass(&mut rig, [0.0, 0.0, 0.07 + room], [0.0, 0.0, -1.0]).norm();
+        let delay = 2.0 * rig.tick.max_gap;
+        let way = v * delay + v * v / 2.0;
+        assert!((way - room).abs() < 1e-9, "{v} m/s with {room} m");
+    }
+    assert_eq!(pass(&mut rig, [0.0, 0.0, 0.07], [0.0, 0.0, -1.0]).norm(), 0.0);
+    assert_eq!(pass(&mut rig, [0.0, 0.0, 0.05], [0.3, 0.0, 0.1]).norm(), Vector3::new(0.3, 0.0, 0.1).norm());
+    // At the plane, a turn that brings the far end nearer is barred, and the way back is not.
+    let tilted = Rotation3::from_axis_angle(&Vector3::x_axis(), 0.5);
+    let end = tilted * Vector3::new(0.0, 0.0, -0.15);
+    rig.set("pose", Pose(IsometryMatrix3::from_parts([0.0, 0.0, -0.08 - end.z].into(), tilted)));
+    for (sign, passes) in [(1.0, false), (-1.0, true)] {
+        rig.set("twist", Twist::new(Vector3::zeros(), Vector3::x() * sign * -0.5));
+        rig.step();
+        let turned = rig.get::<Twist>("twist").unwrap().angular().norm() > 1e-6;
+        assert_eq!(turned, passes, "{sign}");
+    }
+}

@@ -8,6 +8,7 @@ mod check;
 
 use std::borrow::Cow;
 
+use nalgebra::IsometryMatrix3;
 use tactflow_runtime::device::{
     Commands, Description, Device, DeviceError, Disturbance, Driver, Opened, Output, Samples, Stepped,
 };
@@ -16,6 +17,7 @@ use tactflow_runtime::signal::{Image, ImageShape, Joint, Kind, Pose, Scalar, Sca
 
 use super::arm_model::ArmModel;
 use super::frames::{Beats, Frames};
+use super::housing::{Housing, HousingModel};
 use super::joints::SimArm;
 use super::object::{Object, ObjectParams};
 use super::pad_model::PadModel;
@@ -23,6 +25,7 @@ use super::readout::Readout;
 use super::shape::pose3;
 use super::world::World;
 use crate::devices::arm::{self, ArmPorts};
+use crate::devices::wrench::{WrenchPorts, moved};
 use crate::devices::{nanos, pad, period_of};
 use crate::roles::ground_truth;
 use tactflow_runtime::random::Random;
@@ -45,6 +48,8 @@ pub struct Params {
     /// The arm.
     #[param(flatten)]
     arm: ArmModel,
+    /// The housing of the pad, a hard capsule in the frame of the tip that objects touch; none if not given.
+    housing: Option<HousingModel>,
     /// Longest step of the simulation.
     #[param(unit = "s", above = 0.0, default = 0.002)]
     step_s: f64,
@@ -74,8 +79,11 @@ pub struct Params {
 /// given. In the role `ground_truth` it provides true values to
 /// scenarios and recordings only.
 ///
+/// In the role `force_sensor` it measures the wrench of all contacts at the tip: of the pad, and of a `housing`, a hard
+/// capsule around the tool that the pad does not see. The tool has no weight and no inertia of its own.
+///
 /// Not simulated: gravity, coupling of the joints, rotation of objects under load, interaction between columns of foam,
-/// wear and temperature.
+/// friction on the housing, wear and temperature.
 ///
 /// ```toml
 /// [roles]
@@ -105,6 +113,9 @@ pub struct Params {
 pub struct SimBench {
     arm: ArmPorts,
     truth: TruthPorts,
+    wrench: WrenchPorts,
+    /// Pose of the pad on the tip.
+    mount: IsometryMatrix3<f64>,
     world: World,
     frames: Frames,
     joints: Vec<Joint>,
@@ -154,6 +165,8 @@ impl Device for SimBench {
         let bench = Self {
             arm: ports,
             truth: TruthPorts::fill(&mut description, &shape),
+            wrench: WrenchPorts::fill(&mut description, Vec::new()),
+            mount: model.body.mount.pose(),
             frames: Frames::new(image, readout, tactels, [period, latency]),
             joints,
             beats: Beats::new(period, params.for_s.map_or(i64::MAX, nanos)),
@@ -174,7 +187,9 @@ fn world(params: &Params, arm: SimArm, shape: ImageShape) -> Result<World, Mista
         Object::new(object, from, offset).map_err(|message| check::object(i, message))
     };
     let objects = params.objects.iter().enumerate().map(place).collect::<Result<Vec<_>, _>>()?;
-    Ok(World::new(arm, objects, shape, params.pad.foam.clone(), params.pad.points_apart, params.step_s))
+    let housing = params.housing.as_ref().map(|model| Housing::new(model, &params.arm.body.mount));
+    let world = World::new(arm, objects, shape, params.pad.foam.clone(), params.pad.points_apart, params.step_s);
+    Ok(world.with_housing(housing))
 }
 
 impl SimBench {
@@ -219,6 +234,7 @@ impl Stepped for SimBench {
         self.frames.show(now, samples);
         let SimArm { position, equilibrium, .. } = &self.world.arm;
         self.arm.write(samples, now, self.sequence, [position, equilibrium]);
+        self.wrench.write(samples, now, self.sequence, &moved(&self.world.wrench(), &self.mount));
         self.write_truth(now, commands.report(self.arm.contact), samples);
         Ok(())
     }

@@ -45,7 +45,7 @@ pub(crate) fn check(net: &Net<'_>, frames: &mut Frames<'_>, diagnostics: &mut Di
             held.retain(|held| !limits.breaks.contains(held));
             held.extend(limits.holds);
         }
-        let required = path.role.limits.iter().map(|limit| &**limit);
+        let required = path.role.limits.iter().map(|limit| &**limit).filter(|limit| net.needs_limit(wire.role, limit));
         let missing: Vec<&str> = required.filter(|limit| !held.contains(limit)).collect();
         if !missing.is_empty() {
             diagnostics.push(path.unlimited(&missing, &lost));

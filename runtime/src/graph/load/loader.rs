@@ -8,6 +8,7 @@ use super::measured::MeasuredValues;
 use super::request::Request;
 use super::task::Task;
 use crate::graph::syntax::{ALLOW_UNCALIBRATED, BenchDocument, GraphDocument, LIMITS, ROBOT, SENSOR, Sections};
+use crate::node::Spanned;
 use crate::source::{
     BuiltinFile, Code, Diagnostic, Diagnostics, Item, Key, SourceMap, Table, Value, parse_table, suggest_name,
 };
@@ -24,6 +25,8 @@ pub(crate) struct Loader {
     pub(super) is_full: bool,
     /// Whether a part that is a task has wrong roles, so that nothing is known about what it reads and commands.
     pub(crate) has_wrong_roles: bool,
+    /// The roles that a bench adds to every task, each with its type.
+    pub(crate) joined: Vec<(String, String)>,
 }
 
 impl Loader {
@@ -74,6 +77,12 @@ impl Loader {
         self.diagnostics.extend(bench.into_iter().flat_map(|bench| bench.correct_names(&self.sources)));
         let binds = flat.bench.as_ref().map(|bench| bench.bind.clone()).unwrap_or_default();
         self.diagnostics.extend(document.correct_names(&binds, &[], &self.sources));
+        for (name, kind) in &self.joined {
+            let bound = binds.position(name).filter(|_| document.roles.position(name).is_none());
+            let key = bound.map(|at| binds[at].0.clone());
+            let role = key.map(|key| (key.clone(), Spanned { value: kind.clone(), span: key.span }));
+            role.into_iter().for_each(|(key, kind)| document.roles.push(key, kind));
+        }
         flat.roles.clone_from(&document.roles);
         self.add_task(&document, task, &Scope::default(), &mut flat);
         self.flatten(document, "", Scope::default(), &mut flat);

@@ -6,7 +6,7 @@ use super::flat::{Entity, FlatGraph, FlatNode, Scope};
 use super::loader::{Loader, wrong_file_type};
 use super::task::Task;
 use super::task_roles::TaskPart;
-use crate::graph::syntax::{GraphDocument, OnFail, PartBlock, TASK_SECTIONS, Use};
+use crate::graph::syntax::{Block, GraphDocument, OnFail, PartBlock, TASK_SECTIONS, Use, WireEntry};
 use crate::node::FilePath;
 use crate::source::{Code, Diagnostic, Item, Key, Named, Table, Value, quoted, suggest_name};
 
@@ -39,7 +39,15 @@ impl Loader {
             let role = flat.roles.position(scope.roles.get(&key.name).unwrap_or(&key.name));
             self.declare(&mut scope, key, role.map_or(Entity::Unknown, Entity::Role));
         }
-        for block in document.nodes {
+        let role = |scope: &Scope, name: &str| flat.roles.position(scope.roles.get(name).map_or(name, |role| role));
+        let nodes = leave_out(document.nodes, |name| role(&scope, name).is_some());
+        for only_with in nodes.iter().filter_map(|block| block.only_with.as_ref()) {
+            let known = scope.names.get(&only_with.value).is_some_and(|(_, entity)| matches!(entity, Entity::Role(_)));
+            let key = Key { name: only_with.value.clone(), span: only_with.span.clone() };
+            let entity = role(&scope, &key.name).filter(|_| !known).map(Entity::Role);
+            entity.into_iter().for_each(|role| self.declare(&mut scope, &key, role));
+        }
+        for block in nodes {
             self.declare(&mut scope, &block.key, Entity::Node(flat.nodes.len()));
             flat.nodes.push(FlatNode { name: format!("{prefix}{}", block.key.name), scope: index, block });
         }
@@ -218,6 +226,22 @@ fn wrong_part(document: &GraphDocument, file: &FilePath, wires: &[&Key], reads: 
     let own = quoted(document.exports.names());
     let help = format!("name the file of the part that is meant; the exports of this one are {own}");
     Some(Diagnostic::new(Code::UnknownPort, file.span.clone(), message + &more).help(help))
+}
+
+/// Leaves out the nodes that are only for roles which the graph lacks. What reads an output of such a node reads what its
+/// input with the same name reads.
+fn leave_out(nodes: Vec<Block>, has_role: impl Fn(&str) -> bool) -> Vec<Block> {
+    let is_kept = |block: &Block| block.only_with.as_ref().is_none_or(|role| has_role(&role.value));
+    let (mut kept, left): (Vec<_>, Vec<_>) = nodes.into_iter().partition(is_kept);
+    // The last one first: it may read another one.
+    for Block { key, wires, .. } in left.into_iter().rev() {
+        for WireEntry { key: port, from, .. } in wires.valid {
+            let output = format!("{}.{}", key.name, port.name);
+            let readers = kept.iter_mut().flat_map(|block| &mut block.wires.valid);
+            readers.filter(|wire| wire.from.value == output).for_each(|wire| wire.from = from.clone());
+        }
+    }
+    kept
 }
 
 /// Removes the bench that a task names for itself, so that its file need not be there.

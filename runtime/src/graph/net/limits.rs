@@ -4,6 +4,7 @@ use std::collections::BTreeSet;
 
 use super::Net;
 use super::wire::CommandWire;
+use crate::device::RoleType;
 use crate::graph::plan::{PortRef, Producer};
 use crate::graph::syntax::{LimitOwner, LimitSection};
 use crate::node::{NodeSpec, Spanned};
@@ -59,6 +60,18 @@ impl<'a> Net<'a> {
     /// Returns the arms whose motion passes through a node.
     pub(crate) fn arms_of(&self, node: usize) -> &[usize] {
         &self.arms[node]
+    }
+
+    /// Returns whether the commands of an arm must pass one of its limits. A limit that sensors ask for holds only if the
+    /// arm carries such a sensor, or if nothing states which arm does.
+    pub(crate) fn needs_limit(&self, arm: usize, limit: &str) -> bool {
+        let asks = |role: &RoleType| role.arm_limits.iter().any(|own| own == limit);
+        let is_on = |role: &usize| match self.carrier(*role) {
+            Some(carrier) => carrier == arm,
+            None => self.flat.carriers.get(self.name(Producer::Role(*role))).is_none(),
+        };
+        let mut sensors = (0..self.roles.len()).filter(|role| self.roles[*role].is_some_and(asks));
+        !self.catalogue.roles().iter().any(asks) || sensors.any(|role| is_on(&role))
     }
 
     /// Returns the sections whose limits hold for one of some arms: for any arm of the graph if there is none.
@@ -244,7 +257,7 @@ pub(crate) fn twin(name: &str) -> Option<String> {
 /// Returns the unit that the name of a limit ends with: m/s2 for `linear_m_per_s2`. Of other units, such as that of
 /// `gain_per_s`, it returns `None`.
 pub(crate) fn unit_of_limit(name: &str) -> Option<&'static str> {
-    const UNITS: [(&str, &str); 10] = [
+    const UNITS: [(&str, &str); 11] = [
         ("m_per_s2", "m/s2"),
         ("rad_per_s2", "rad/s2"),
         ("m_per_s", "m/s"),
@@ -252,6 +265,7 @@ pub(crate) fn unit_of_limit(name: &str) -> Option<&'static str> {
         ("raw", "raw"),
         ("rad", "rad"),
         ("mm", "mm"),
+        ("n_m", "N m"),
         ("m", "m"),
         ("n", "N"),
         ("s", "s"),
@@ -277,6 +291,7 @@ mod tests {
             ("joint_rad_per_s2", Some("rad/s2")),
             ("force_n", Some("N")),
             ("blind_s", Some("s")),
+            ("wrench_n_m", Some("N m")),
             ("blind_mm", Some("mm")),
             ("workspace_min_m", Some("m")),
             ("gain_per_s", None),

@@ -114,6 +114,8 @@ pub(crate) struct Block {
     pub(crate) kind: Option<Spanned<String>>,
     pub(crate) wires: InputWires,
     pub(crate) params: Value,
+    /// The role without which the node is left out.
+    pub(crate) only_with: Option<Spanned<String>>,
 }
 
 /// The block of a part: its file, the wires into it, and its overrides.
@@ -326,7 +328,8 @@ impl<'a> Sections<'a> {
 
     fn node(&mut self, key: Key, mut table: Table, names: &[String], sources: &[String]) -> Block {
         correct_block(&mut table, sources, &mut self.reader);
-        Block { wires: self.wires(&mut table), ..self.block(key, table, names) }
+        let only_with = table.remove("only_with").and_then(|(_, value)| Spanned::read(&value, &mut self.reader));
+        Block { only_with, wires: self.wires(&mut table), ..self.block(key, table, names) }
     }
 
     fn block(&mut self, key: Key, mut table: Table, names: &[String]) -> Block {
@@ -344,7 +347,7 @@ impl<'a> Sections<'a> {
         };
         // A missing parameter is reported at the name of the block.
         let params = Value { span: key.span.clone(), item: Item::Table(table) };
-        Block { key, kind, wires: InputWires::default(), params }
+        Block { key, kind, wires: InputWires::default(), params, only_with: None }
     }
 
     fn part_block(&mut self, key: Key, mut table: Table, sources: &[String]) -> PartBlock {

@@ -1,0 +1,99 @@
+//! The second ceiling: the housing of a pad meets a wall that the pad does not see. Judged by the true force on the tool.
+
+use tactflow_runtime::engine::Engine;
+use tactflow_runtime::graph::{Request, compile};
+use tactflow_runtime::signal::Scalar;
+use tactflow_runtime::source::Code;
+use tactflow_tests::{catalogue, workspace};
+
+/// The ceiling [N].
+const CEILING: f64 = 20.0;
+
+/// An arm that moves along x of its pad, toward a wall at `wall` [m], with more lines of the bench.
+fn toward_wall(speed: f64, stiffness: f64, bench: &str) -> Request {
+    let graph = format!(
+        "[graph]\nclock = 'pad'\nstart = 'there'\n[roles]\npad = 'tactile_pad'\narm = 'velocity_arm'\n\
+         [commands]\narm.velocity = 'move.velocity'\n[nodes.wave]\ntype = 'twist_source'\ntwist = [0, 0, 0, 0, 0, 0]\n\
+         [modes.there]\nset.wave.twist = [{speed:?}, 0, 0, 0, 0, 0]\nfail = {{ after_ms = 30000 }}\n\
+         [parts.touch]\nfile = 'builtin:parts/touch.toml'\nin.image = 'pad.image'\n\
+         [parts.move]\nfile = 'builtin:parts/move.toml'\nin.twist = 'wave.twist'\nin.image = 'touch.image'\n\
+         in.contact = 'touch.present'\nin.position = 'arm.position'\nin.equilibrium = 'arm.equilibrium'\n\
+         [limits]\nlinear_m_per_s = 0.05\nangular_rad_per_s = 0.8\nlinear_m_per_s2 = 2.0\nangular_rad_per_s2 = 10.0\n\
+         force_n = 15.0\npeak_n = 3.0\nblind_s = 20.0\nblind_mm = 300.0\n"
+    );
+    let turn = std::f64::consts::FRAC_PI_2;
+    let bench = format!(
+        "[bind]\npad = 'bench'\narm = 'bench'\ntruth = 'bench'\nforce = 'bench'\n\
+         [devices.bench]\ntype = 'sim_bench'\nfor_s = 6.0\ncalibration = 'builtin:calibrations/sim_pad.toml'\n\
+         robot = 'builtin:lwr4p.toml'\nmount = {{ xyz = [0.0, 0.0, 0.03] }}\nstiffness = {stiffness:?}\n\
+         housing = {{ ends_m = [[0.0, 0.0, 0.0], [0.15, 0.0, 0.0]], radius_m = 0.02 }}\n\
+         objects = [{{ shape = 'plane', at = [0.19, 0.0, 0.0], turn = [0.0, {turn:?}, 0.0] }}]\n\
+         [limits]\nworkspace_min_m = [-0.9, -0.6, 0.1]\nworkspace_max_m = [-0.1, 0.6, 0.9]\n{bench}\n"
+    );
+    Request { bench_text: Some(bench), ..Request::text(graph) }
+}
+
+/// Returns the largest true force and torque on the tool [N, N m], and the true force on the pad at the end.
+fn largest(request: &Request) -> [f64; 3] {
+    let plan = compile(&catalogue(), request).unwrap_or_else(|report| panic!("{}", report.render(false)));
+    let (mut engine, mut largest) = (Engine::new(plan), [0.0_f64; 3]);
+    let get = |engine: &Engine, port: &str| engine.get::<Scalar>(port).copied().unwrap_or_default();
+    while let Some(next) = engine.next() {
+        engine.tick(next).unwrap_or_else(|fault| panic!("{fault}"));
+        let norm = |ports: [&str; 3]| ports.map(|port| get(&engine, port).powi(2)).iter().sum::<f64>().sqrt();
+        let now = [norm(["force.fx", "force.fy", "force.fz"]), norm(["force.tx", "force.ty", "force.tz"])];
+        largest = [largest[0].max(now[0]), largest[1].max(now[1]), get(&engine, "truth.force")];
+    }
+    largest
+}
+
+#[test]
+fn the_housing_stops_below_the_ceiling_and_the_pad_feels_nothing() {
+    for stiffness in [20_000.0, 200.0] {
+        let [force, _, pad] = largest(&toward_wall(0.05, stiffness, "wrench_n = 20.0"));
+        assert!((5.0..CEILING).contains(&force), "{force} N on an arm of {stiffness} N m/rad");
+        assert_eq!(pad, 0.0, "the pad sees no wall");
+        // A graph without the limiter, on the same bench without the sensor, presses on.
+        let mut blind = toward_wall(0.05, stiffness, "");
+        blind.bench_text = blind.bench_text.map(|text| text.replace("force = 'bench'\n", ""));
+        let report = compile(&catalogue(), &blind).unwrap_or_else(|report| panic!("{}", report.render(false)));
+        assert!(report.outline().nodes.iter().all(|node| node.name != "move.wrench"), "the limiter is not there");
+        let mut loose = toward_wall(0.05, stiffness, "wrench_n = 2000.0");
+        loose.set = vec!["parts.move.set.wrench.threshold_n=1.0".into()];
+        let [force, ..] = largest(&loose);
+        assert!(force > 1.5 * CEILING, "only the ceiling stops it: {force} N");
+    }
+}
+
+#[test]
+fn a_torque_has_its_own_ceiling() {
+    let [force, torque, _] = largest(&toward_wall(0.05, 20_000.0, "wrench_n = 200.0\nwrench_n_m = 1.0"));
+    assert!(torque < 1.0 && force < 200.0, "{torque} N m, {force} N");
+}
+
+#[test]
+fn a_bench_with_a_sensor_of_the_force_needs_the_limit_in_each_task() {
+    let without = toward_wall(0.05, 200.0, "");
+    let report = compile(&catalogue(), &without).err().expect("the ceiling is missing");
+    let missing = |code: Code, word: &str| {
+        report.diagnostics.iter().any(|found| found.code == code && found.message.contains(word))
+    };
+    assert!(missing(Code::MissingLimit, "`wrench_n`"), "{}", report.render(false));
+    // A part of somebody's own without the limiter is not enough.
+    let (_folder, path) = crate::cli::in_new_folder("move.toml");
+    let part = std::fs::read_to_string(workspace().join("graphs/parts/move.toml")).unwrap();
+    let (before, rest) = part.split_once("[nodes.wrench]").unwrap();
+    let (_, after) = rest.split_once("[nodes.workspace]").unwrap();
+    let cut = format!("{before}[nodes.workspace]{after}").replace("\"wrench.twist\"", "\"contact.twist\"");
+    std::fs::write(&path, cut).unwrap();
+    let mut own = toward_wall(0.05, 200.0, "wrench_n = 20.0");
+    own.text = own.text.map(|text| text.replace("builtin:parts/move.toml", &path));
+    let report = compile(&catalogue(), &own).err().expect("it lacks the limit");
+    let found = report.diagnostics.iter().find(|found| found.code == Code::UnlimitedCommand);
+    let found = found.unwrap_or_else(|| panic!("{}", report.render(false)));
+    assert!(found.message.contains("without the required limit `wrench`"), "{}", found.message);
+    assert!(found.help.as_ref().unwrap().contains("wrench_limit"), "{:?}", found.help);
+    // Without the sensor nothing asks for it.
+    own.bench_text = own.bench_text.map(|text| text.replace("force = 'bench'\n", ""));
+    assert!(compile(&catalogue(), &own).is_ok());
+}
