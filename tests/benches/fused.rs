@@ -38,7 +38,7 @@ const P: Law = Law { kp: 0.5, ki: 0.0, kd: 0.0, within: f64::INFINITY, bound: 1.
 const LAWS: [Law; 4] = [P, P, Law { ki: 0.1, within: 10.0, bound: 5.0, ..P }, P];
 const BLIND: blind_limit::Bounds = blind_limit::Bounds { time: 20.0, way: 0.1, linear: 1.0, angular: 10.0 };
 const LOSS: lost_contact::Times = lost_contact::Times { debounce: 20_000_000, wait: 500_000_000 };
-const MANNER: lost_contact::Manner = lost_contact::Manner { retreat: 0.02, search: 0.005, half: [0.0178; 2] };
+const MANNER: lost_contact::Manner = lost_contact::Manner { retreat: 0.02, search: 0.005, half: [0.01778; 2] };
 /// The way of an approach at 10 mm/s that goes on for two periods and brakes with 1 m/s², which raw ceilings leave [m].
 const WAY: f64 = 0.01 * 0.2 + 0.01 * 0.01 / 2.0;
 const CEILINGS: [contact_limit::Ceiling; 2] = [ceiling(2000.0), ceiling(240.0)];
@@ -76,6 +76,8 @@ pub(crate) struct Fused {
     course: lost_contact::Course,
     corners: [Vector3<f64>; 4],
     budget: blind_limit::Budget,
+    /// The load of the pad with its falls low-passed, over 0.1 s.
+    held: contact_limit::PadLoad,
     /// Speed of the fastest corner of the pad [m/s].
     speed: f64,
     /// Time of this tick, and of the last contact if it lasts [ns].
@@ -140,6 +142,7 @@ impl Fused {
             course: lost_contact::Course::default(),
             corners: blind_limit::corners(&shape),
             budget: blind_limit::Budget::default(),
+            held: contact_limit::PadLoad::default(),
             speed: 0.0,
             now: 0,
             contact_at: None,
@@ -226,17 +229,18 @@ impl Fused {
     }
 
     /// The ceilings of the sum and of a tactel, in raw readings.
-    fn contact(&self, twist: &mut Twist, tick: &Tick) {
+    fn contact(&mut self, twist: &mut Twist, tick: &Tick) {
+        let load = contact_limit::load(&self.image);
+        self.held = load.held(self.held, 0.5);
         let (shape, image) = (&self.shape, &self.image);
         let half = [shape.cols as f64 * shape.pitch[0] / 2.0, shape.rows as f64 * shape.pitch[1] / 2.0];
-        let load = contact_limit::load(image);
         let delay = 2.0 * tick.dt.max(0.1);
         let [force, peak] = CEILINGS;
         let touches = load.peak > 3.0;
-        contact_limit::bar(twist, half, force.allowed_speed(load.sum, delay), || {
+        contact_limit::bar(twist, half, force.allowed_speed(self.held.sum, delay), || {
             touches.then(|| contact_limit::centre(shape, image))
         });
-        contact_limit::bar(twist, half, peak.allowed_speed(load.peak, delay), || {
+        contact_limit::bar(twist, half, peak.allowed_speed(self.held.peak, delay), || {
             touches.then(|| contact_limit::highest(shape, image, load.peak))
         });
     }
@@ -266,11 +270,11 @@ impl Fused {
         for (to, column) in self.at_sensor.iter_mut().zip(&self.columns) {
             *to = at_sensor(column);
         }
-        damped::solve(&self.at_sensor, &at_sensor(&spatial), 0.05, out);
-        joint_limits::limit(&self.joints, q, 5.0, out);
+        let nearness = damped::solve(&self.at_sensor, &at_sensor(&spatial), 0.02, out);
         let mut drift: [f64; 7] = std::array::from_fn(|i| 0.5 * (POSTURE[i] - q[i]));
         null_space::project(&self.at_sensor, &mut self.rows, &mut drift);
-        joint_limits::add_within(&self.joints, q, 5.0, out, &drift);
+        let is_within = joint_limits::add_within(&self.joints, q, 0.2, out, &drift);
+        assert!(is_within && nearness.damping == 0.0, "the task stays far from limits and singularities");
     }
 
     /// From the region to the twist of the sensor (eqs. 1-3 and 5).

@@ -59,12 +59,16 @@ const MOST_BARE: f64 = 1.25;
 /// The same with finite checks, sampled timing and the net that catches a panic.
 const MOST: f64 = 1.4;
 
-fn finger_press() {
+/// Compares the graph with the fused function on the whole recording.
+fn same_bits() {
     let mut whole = finger_press::Pair::new();
     let same = (0..whole.frames()).filter(|_| whole.step()).count();
     println!("joint velocities of graph and fused function have the same bits in {same} of {} ticks", whole.frames());
     assert_eq!(same, whole.frames());
+}
 
+fn finger_press() {
+    same_bits();
     // In the middle of a press.
     const FRAME: usize = 150;
     let mut pair = finger_press::Pair::new();
@@ -153,6 +157,7 @@ fn main() {
         [what, pads, ticks] if what == "hand" => {
             count_hand(pads.parse().expect("a number of pads"), ticks.parse().expect("a number of ticks"));
         }
+        [what] if what == "same" => same_bits(),
         [what, ticks] => count(what, ticks.parse().expect("a number of ticks")),
         _ => {
             chains();

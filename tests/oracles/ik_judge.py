@@ -8,6 +8,7 @@ Every solver gets the same home posture, the same gain toward it (0.5/s), and th
 
 - pink minimizes the error of the twist and, with a small weight, that of the posture, within its limits of range and
   speed, with its own damping.
+- pink, ruled is pink with the two further rules of `ik_sink`: room to brake, and no push beyond the one that is asked.
 - Drake maximizes the part of the twist that it keeps, with exactly its direction, and centres the joints.
 
 The metrics, of which a lower value is better:
@@ -18,10 +19,11 @@ The metrics, of which a lower value is better:
   counts as stopped.
 - push: speed along z of the sensor that a slide gets, as a fraction of the speed of the slide.
 - stuck: motions of 0.5 s with the twist held after which the arm follows less than a tenth of the twist.
+- lost: mean length of the part of the twist that is not made, as a fraction of the twist.
 - slowed: mean fraction of the twist that is missing along its direction.
 - jump: change of the velocities between two postures that are 1e-4 rad apart [rad/s].
 - posture: distance of the motion of the elbow from the one toward home, as a fraction of the latter; arms with an
-  elbow, ordinary postures.
+  elbow, ordinary postures in which the twist and the posture can both be had within the speeds and braking distances.
 """
 
 import argparse
@@ -35,7 +37,7 @@ from pathlib import Path
 import numpy as np
 import pinocchio as pin
 import pink
-from pink.limits import ConfigurationLimit, VelocityLimit
+from pink.limits import ConfigurationLimit, Limit, VelocityLimit
 from pink.tasks import PostureTask
 from pink.tasks.task import Task
 from pydrake.multibody.inverse_kinematics import (
@@ -48,11 +50,12 @@ ROBOTS = Path(__file__).resolve().parents[2] / "graphs" / "robots"
 TIPS = {"lwr4p": "lwr_7_link", "panda": "panda_link8", "ur5e": "tool0"}
 HOMES = {
     "lwr4p": [0.0, 0.5, 0.0, -1.3, 0.0, 1.3, 0.0],
-    "panda": [0.0, -0.1, 0.0, -2.2, 0.0, 2.1, 0.7854],
-    "ur5e": [0.0, -1.7, -2.0, -1.0124, 1.5708, 0.0],
+    "panda": [0.0, -0.1, 0.0, -2.2, 0.0, 2.1, np.pi / 4],
+    "ur5e": [0.0, -1.7, -2.0, -1.0124, np.pi / 2, 0.0],
 }
 ACCELERATIONS = {"lwr4p": 10.0, "panda": 7.5, "ur5e": 10.0}  # [rad/s2]
 POSTURE_GAIN = 0.5  # [1/s]
+BRAKING_DELAY = 0.2  # [s], of `ik_sink`
 WEIGHT = np.array([1.0, 1.0, 1.0, 0.2, 0.2, 0.2])  # [1, m]
 KINDS = ("ordinary", "limit", "singular")
 
@@ -74,6 +77,22 @@ class TwistTask(Task):
         return configuration.get_frame_jacobian(self.frame)
 
 
+class Rules(Limit):
+    """The rules of `ik_sink` as a limit of pink: room to brake, and a motion along z between 0 and the wanted one."""
+
+    def __init__(self, robot):
+        super().__init__()
+        self.robot = robot
+
+    def compute_qp_inequalities(self, configuration, dt):
+        robot, q = self.robot, configuration.q
+        eye = np.eye(len(q))
+        push, wanted = robot.jacobian(q)[2], robot.task.twist[2]
+        rooms = (robot.upper - q, q - robot.lower)
+        fastest = [np.minimum(robot.fastest(room, BRAKING_DELAY), robot.speed) for room in rooms]
+        return np.vstack([eye, -eye, push, -push]), dt * np.hstack([*fastest, max(wanted, 0), max(-wanted, 0)])
+
+
 class Robot:
     def __init__(self, name, dt):
         self.model = pin.buildModelFromUrdf(str(ROBOTS / f"{name}.urdf"))
@@ -89,6 +108,7 @@ class Robot:
         self.posture = PostureTask(cost=1e-3, gain=POSTURE_GAIN * dt)
         self.posture.set_target(self.home)
         self.limits = [ConfigurationLimit(self.model), VelocityLimit(self.model)]
+        self.ruled = [*self.limits, Rules(self)]
         count = self.model.nq
         self.drake = DifferentialInverseKinematicsParameters(count, count)
         self.drake.set_time_step(dt)
@@ -100,16 +120,23 @@ class Robot:
     def jacobian(self, q):
         return pin.computeFrameJacobian(self.model, self.data, q, self.frame, pin.LOCAL)
 
-    def by_pink(self, q, twist):
+    def fastest(self, room, delay):
+        """The speeds from which the joints stop within their room, after a delay."""
+        return self.acceleration * (np.sqrt(delay**2 + 2 * room.clip(0) / self.acceleration) - delay)
+
+    def by_pink(self, q, twist, limits=None):
         configuration = pink.Configuration(self.model, self.data, q)
         self.task.twist = twist
         tasks = [self.task, self.posture]
         try:
             return pink.solve_ik(
-                configuration, tasks, self.dt, "quadprog", limits=self.limits, safety_break=False
+                configuration, tasks, self.dt, "quadprog", limits=limits or self.limits, safety_break=False
             )
         except (pink.exceptions.PinkError, ValueError):
             return None
+
+    def by_ruled_pink(self, q, twist):
+        return self.by_pink(q, twist, self.ruled)
 
     def by_drake(self, q, twist):
         result = DoDifferentialInverseKinematics(q, np.zeros_like(q), twist, self.jacobian(q), self.drake)
@@ -141,6 +168,7 @@ class Metrics:
         self.add("braking", kind, overruns(robot, q, v))
         along = achieved @ asked / size**2
         self.add("slowed", kind, 1 - along)
+        self.add("lost", kind, np.linalg.norm(achieved - asked) / size)
         moved = np.linalg.norm(achieved)
         if moved > 0.01 * size:
             # The arc tangent is exact for small angles.
@@ -153,8 +181,12 @@ class Metrics:
             last = WEIGHT * (robot.jacobian(path[-2]) @ ((path[-1] - path[-2]) / robot.dt))
             self.add("stuck", kind, last @ asked / size**2 < 0.1)
         if kind == "ordinary" and len(q) > 6:
-            null = np.eye(len(q)) - np.linalg.pinv(j) @ j
+            inverse = np.linalg.pinv(j)
+            null = np.eye(len(q)) - inverse @ j
             wanted = null @ (POSTURE_GAIN * (robot.home - q))
+            both = inverse @ twist + wanted
+            if violates(robot, q, both) or overruns(robot, q, both, BRAKING_DELAY, -1e-6):
+                return
             self.add("posture", kind, np.linalg.norm(null @ v - wanted) / max(np.linalg.norm(wanted), 1e-3))
 
 
@@ -166,9 +198,10 @@ def violates(robot, q, v):
     return bool((np.abs(v) > robot.speed * (1 + 1e-6)).any() or (inside & outside).any())
 
 
-def overruns(robot, q, v):
-    room = np.where(v > 0, robot.upper - q, q - robot.lower).clip(0)
-    return bool((np.abs(v) > np.sqrt(2 * robot.acceleration * room) + 1e-6).any())
+def overruns(robot, q, v, delay=0.0, tolerance=1e-6):
+    """Whether a joint that keeps its speed for the delay [s] cannot stop before its limit."""
+    room = np.where(v > 0, robot.upper - q, q - robot.lower)
+    return bool((np.abs(v) > robot.fastest(room, delay) + tolerance).any())
 
 
 def steps(robot, q, path):
@@ -205,12 +238,13 @@ def judged(path, stride):
     cases = read(path, stride)
     dt, count = next(cases)
     robots = {name: Robot(name, dt) for name in TIPS}
-    all_metrics = {"ik_sink": Metrics(), "pink": Metrics(), "Drake": Metrics()}
+    all_metrics = {name: Metrics() for name in ("ik_sink", "pink", "pink, ruled", "Drake")}
     began, number = time.monotonic(), 0
     for number, (name, kind, q, twist, v, near, near_v, ours) in enumerate(cases, 1):
         robot = robots[name]
         all_metrics["ik_sink"].judge(robot, kind, q, twist, v, near_v, ours if len(ours) else None)
-        for solver, solve in (("pink", robot.by_pink), ("Drake", robot.by_drake)):
+        solvers = {"pink": robot.by_pink, "pink, ruled": robot.by_ruled_pink, "Drake": robot.by_drake}
+        for solver, solve in solvers.items():
             path = motion(robot, solve, q, twist, count) if kind != "ordinary" else None
             all_metrics[solver].judge(robot, kind, q, twist, solve(q, twist), solve(near, twist), path)
     print(f"{number} cases, {time.monotonic() - began:.0f} s")
@@ -230,7 +264,7 @@ def table(all_metrics):
     rows = []
     for name, show in (
         ("failed", percent), ("limits", percent), ("braking", percent), ("turn", percentiles), ("push", percentiles),
-        ("stuck", percent), ("slowed", percent), ("jump", percentiles), ("posture", percentiles),
+        ("stuck", percent), ("lost", percent), ("slowed", percent), ("jump", percentiles), ("posture", percentiles),
     ):
         for kind in KINDS:
             cells = [metrics.values.get((name, kind)) for metrics in all_metrics.values()]

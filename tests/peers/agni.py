@@ -11,7 +11,8 @@ standard input say what goes wrong next:
     extra     the next frame has a byte too many     garbage   text stands before the next frame
     fault     an error with a text is sent           silence   no frames are sent; `speak` ends it
     half      half a frame is sent, and the device is unplugged
-    unplug    the terminal is closed                 replug    a new one is opened behind the same link
+    unplug    the terminal is closed                 replug    a new one is opened behind the same link; with a word,
+                                                               it has another serial number
     ask TAG   prints TAG, and how many frames have gone out
 
 The cells of a frame are a ramp, (base + i) modulo 4096 for tactel i, so a frame that is mixed up shows.
@@ -173,6 +174,7 @@ class Device:
         elif words[0] == "unplug":
             self.unplug()
         elif words[0] == "replug":
+            self.options.serial = words[1] if len(words) > 1 else self.options.serial
             self.plug()
         elif words[0] == "ask":
             print(json.dumps({"tag": words[1], "frames": self.frames, "is_started": self.is_started}), flush=True)

@@ -165,6 +165,20 @@ fn a_sensor_that_is_unplugged_is_lost_and_starts_again() {
 }
 
 #[test]
+fn another_serial_number_behind_the_same_port_ends_the_device() {
+    let mut sensor = Sensor::start(&["--serial", "B012"]);
+    let mut rig = sensor.rig("");
+    images(&mut rig, 5);
+    sensor.order("unplug");
+    assert!(rig.wait_until(SOON, |rig| rig.lost("image").is_some()));
+    sensor.order("replug B013");
+    let is_named = |rig: &LinkRig| rig.lost("image").is_some_and(|why| why.contains("number B013"));
+    assert!(rig.wait_until(SOON, is_named), "{:?}", rig.lost("image"));
+    let error = rig.stop().unwrap_err().to_string();
+    assert!(error.contains("(serial number B012): another device has come back"), "{error}");
+}
+
+#[test]
 fn a_silent_sensor_is_lost_and_greeted_again() {
     let mut sensor = Sensor::start(&[]);
     let mut rig = sensor.rig("silence_ms = 300");

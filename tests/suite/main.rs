@@ -16,6 +16,7 @@ mod cell;
 mod cli;
 mod clocks;
 
+mod control_law;
 mod course;
 mod crossings;
 mod determinism;
@@ -29,6 +30,7 @@ mod erased;
 mod errors;
 mod examples;
 mod explain;
+mod fault_matrix;
 mod faults;
 mod features;
 #[cfg(target_os = "linux")]

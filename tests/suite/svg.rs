@@ -27,7 +27,7 @@ fn the_curves_of_the_picture_are_those_of_the_recording() {
             .contains("\nerror.error.x [m]: 150 points for 150 values\nerror.error.y [m]: 150 points for 150 values\n"),
         "{short}"
     );
-    let long = compared(&[HYBRID]);
+    let long = compared(&[HYBRID, "--for=6s"]);
     assert!(long.starts_with("title graphs/hybrid.toml, 256 tactels, 1 mark, modes approach servo\n"), "{long}");
     assert!(long.contains("\nerror.error.x [m]: ") && long.contains("\nerror.error.pressure [N/tactel]: "), "{long}");
 }

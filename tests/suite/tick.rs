@@ -80,7 +80,7 @@ fn in_a_jail() {
     }
     for engine in &mut engines {
         let mut ticks = 0;
-        while let Some(now) = engine.next().filter(|_| ticks < 3000) {
+        while let Some(now) = engine.next().filter(|_| ticks < 1000) {
             engine.tick(now).unwrap();
             ticks += 1;
         }

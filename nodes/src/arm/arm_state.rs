@@ -60,7 +60,7 @@ pub struct Inputs<'a> {
 /// What `arm_state` writes.
 #[derive(Outputs)]
 pub struct Outputs {
-    /// The same positions, with the names and limits of the model's joints.
+    /// The same positions, with the names and limits of the model's joints, and the accelerations of the arm's.
     #[port(unit = "rad", robot = "R", quantity = "position")]
     joints: Out<Joints>,
     /// Pose of the sensor in the base.
@@ -79,8 +79,12 @@ impl Node for ArmState {
 
     fn new(params: Params, setup: &mut Setup<Self>) -> Result<Self, Mistakes> {
         let chain = load(&params.urdf, &params.tip, &params.mount)?;
-        let joints = JointsShape { joints: chain.joints().to_vec(), unit: Unit::RADIAN };
+        let mut joints = JointsShape { joints: chain.joints().to_vec(), unit: Unit::RADIAN };
         check_joints(&setup.inputs.position, &joints)?;
+        // A model states no accelerations, so they are those of the arm.
+        for (joint, of_arm) in joints.joints.iter_mut().zip(&setup.inputs.position.joints) {
+            joint.acceleration = of_arm.acceleration;
+        }
         setup.outputs.sensor_pose = PoseShape { start: start(&chain, &setup.inputs.position) };
         setup.outputs.jacobian = JacobianShape(joints.clone());
         setup.outputs.joints = joints;
@@ -137,6 +141,17 @@ mod tests {
         let Shape::Joints(shape) = rig.shape("joints") else { panic!("joints") };
         assert!((shape.joints[1].upper - 120f64.to_radians()).abs() < 1e-9);
         assert_eq!(rig.shape("jacobian"), &JacobianShape(shape.clone()).into());
+    }
+
+    #[test]
+    fn the_joints_have_the_accelerations_that_the_arm_states() {
+        let params = format!("urdf = '{URDF}'\nsensor = 'pad'\ntip = 'lwr_7_link'");
+        let mut arm = wire(&NAMES);
+        arm.joints[2].acceleration = 7.5;
+        let rig = NodeRig::new::<ArmState>(&params, &[("position", arm.into())]).unwrap();
+        let Shape::Joints(shape) = rig.shape("joints") else { panic!("joints") };
+        let accelerations: Vec<f64> = shape.joints.iter().map(|joint| joint.acceleration).collect();
+        assert_eq!(accelerations[1..4], [f64::INFINITY, 7.5, f64::INFINITY]);
     }
 
     #[test]

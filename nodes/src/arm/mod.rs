@@ -12,6 +12,7 @@ pub mod ik_sink;
 pub mod inverse_pose;
 pub mod joint_limits;
 mod joint_names;
+pub mod least_lost;
 pub mod model;
 #[cfg(test)]
 mod models;

@@ -187,7 +187,7 @@ impl Contact {
         }
         self.slides.clear();
         self.slides.extend(objects.iter().map(|object| Slide::of(object, pad)));
-        for (index, object) in objects.iter().enumerate() {
+        for (index, object) in objects.iter().enumerate().filter(|(_, object)| !object.is_gone) {
             self.find(pad, index, object);
         }
         // The points are in raster order per object, and the sums need raster order over all objects.

@@ -88,6 +88,12 @@ pub struct Object {
     pub(super) shape: Geometry,
     /// Compliance of its surface under a tactel of 5 mm by 5 mm [m/N].
     pub(super) softness: f64,
+    /// The same, without a disturbance [m/N].
+    own_softness: f64,
+    /// Whether it touches nothing, because it is gone.
+    pub(super) is_gone: bool,
+    /// Velocity of a disturbance [m/s].
+    drift: Vec3,
     home: Pose3,
     /// Motions, with displacements in the base.
     script: Vec<ScriptedMove>,
@@ -138,6 +144,9 @@ impl Object {
         Self {
             shape,
             softness,
+            own_softness: softness,
+            is_gone: false,
+            drift: Vec3::ZERO,
             home: pose,
             script: Vec::new(),
             axis: Vec3::Z,
@@ -155,6 +164,12 @@ impl Object {
         (self.pose, self.velocity, self.spin) = (pose, velocity, spin);
     }
 
+    /// Disturbs the object from now on: it moves at `velocity` in the base [m/s], its surface is stiffer by a factor, or
+    /// it is gone.
+    pub fn disturb(&mut self, velocity: Vec3, stiffness: f64, is_gone: bool) {
+        (self.drift, self.softness, self.is_gone) = (velocity, self.own_softness / stiffness, is_gone);
+    }
+
     /// Advances by `dt` [s] to `time` [s] under the `force` of the pad [N].
     pub fn step(&mut self, time: f64, dt: f64, force: Vec3) {
         if let Some((stiffness, mass)) = self.mount {
@@ -162,7 +177,8 @@ impl Object {
             self.sag_speed += (force - self.sag * stiffness - self.sag_speed * damping) / mass * dt;
             self.sag += self.sag_speed * dt;
         }
-        let (mut position, mut velocity) = (self.home.translation + self.sag, self.sag_speed);
+        self.home.translation += self.drift * dt;
+        let (mut position, mut velocity) = (self.home.translation + self.sag, self.sag_speed + self.drift);
         let (mut angle, mut spin) = (0.0, 0.0);
         for step in &self.script {
             let span = step.to_s - step.from_s;

@@ -2,6 +2,7 @@
 
 use nalgebra::{IsometryMatrix3, Vector3};
 use parry3d_f64::math::{Pose3, Vec3};
+use tactflow_runtime::device::Disturbance;
 use tactflow_runtime::signal::{ImageShape, Joint as Limits, Unit};
 
 use super::contact::{BodyMotion, Contact};
@@ -82,6 +83,35 @@ fn at_rest_the_prismatic_joint_and_the_foam_balance() {
         let clean: f64 = world.image().iter().sum();
         assert!((clean - force).abs() < 1e-9, "the image has the whole force: {clean}");
     }
+}
+
+#[test]
+fn a_hand_and_a_disturbed_object_have_the_forces_of_springs() {
+    let (foam, spring) = (lossless(), 5000.0);
+    let joint = JointDynamics { stiffness: spring, damping_ratio: 1.0, inertia: 2.0, friction: 0.0 };
+    let plane = ObjectParams { stiffness: Some(400.0), ..thing(ShapeKind::Plane, [0.0, 0.0, 0.002]) };
+    let mut world = world(slide(joint), foam.clone(), &[plane], 0.0005);
+    let mut time = 0.0;
+    let mut settle = |disturbance: Disturbance, seconds: f64| {
+        world.disturb(&disturbance);
+        time += seconds;
+        world.advance(time, &[0.0]);
+        (world.arm.motion().pose.translation.z, world.contact.normal())
+    };
+    // The hand presses the pad on the plane: its force is that of the arm's spring and of the contact.
+    let (way, force) = settle(Disturbance { push: [0.0, 0.0, 30.0], ..Disturbance::default() }, 2.0);
+    assert!(way > 0.002 && force > 1.0 && (spring * way + force - 30.0).abs() < 1e-3, "{way} {force}");
+    // A stiffer surface gives way less.
+    let stiff = Disturbance { push: [0.0, 0.0, 30.0], stiffness: 10.0, ..Disturbance::default() };
+    let (deep, harder) = settle(stiff, 2.0);
+    assert!(harder > force && deep - 0.002 < 0.8 * (way - 0.002), "{harder} N at {deep} m");
+    // Nothing is there.
+    let (way, force) = settle(Disturbance { is_gone: true, ..Disturbance::default() }, 2.0);
+    assert!(way.abs() < 1e-6 && force == 0.0, "{way} {force}");
+    // The plane has moved by 5 mm in 1 s: 3 mm beyond the pad at rest, which the springs share.
+    settle(Disturbance { velocity: [0.0, 0.0, -0.005], ..Disturbance::default() }, 1.0);
+    let (way, force) = settle(Disturbance::default(), 2.0);
+    assert!(way < -1e-4 && way > -0.003 && (spring * way + force).abs() < 1e-3, "{way} {force}");
 }
 
 #[test]

@@ -1,6 +1,7 @@
 //! The physics of the simulated bench: an arm with a pad, and objects, stepped together.
 
-use parry3d_f64::math::Vec3;
+use parry3d_f64::math::{Rot3, Vec3};
+use tactflow_runtime::device::Disturbance;
 use tactflow_runtime::signal::ImageShape;
 
 use super::contact::{Contact, Wrench};
@@ -21,6 +22,10 @@ pub struct World {
     wrench: Wrench,
     pub(super) imprint: Imprint,
     pub(super) shape: ImageShape,
+    /// Axes of the sensor at the start, in the base.
+    axes: Rot3,
+    /// Force of a hand on the sensor, in the base [N].
+    push: Vec3,
     /// Force on each object [N].
     loads: Vec<Vec3>,
     /// Simulated time [s].
@@ -43,16 +48,17 @@ impl World {
         let loads = vec![Vec3::ZERO; objects.len()];
         let from = arm.motion().pose;
         let survey = objects.iter().enumerate().find_map(|(i, object)| Some((i, Survey::new(object, from)?)));
-        let (housing, wrench) = (None, Wrench::default());
         Self {
             survey,
             arm,
             objects,
             contact,
-            housing,
-            wrench,
+            housing: None,
+            wrench: Wrench::default(),
             imprint,
             shape,
+            axes: from.rotation,
+            push: Vec3::ZERO,
             loads,
             time: 0.0,
             max_step,
@@ -66,7 +72,8 @@ impl World {
         Self { housing, ..self }
     }
 
-    /// Returns the force and the torque on the pad and its housing about the origin of the pad, in its axes [N, N m].
+    /// Returns the force and the torque on the pad, its housing and a hand at the sensor about the origin of the pad, in
+    /// its axes [N, N m].
     #[must_use]
     pub fn wrench(&self) -> [f64; 6] {
         let pose = self.arm.motion().pose;
@@ -89,10 +96,19 @@ impl World {
             if let Some(housing) = &self.housing {
                 housing.press(&pad, &self.objects, &mut self.wrench, &mut self.loads);
             }
+            self.wrench.force += self.push;
             self.arm.step(dt, velocity, &self.wrench);
         }
         self.time = time;
         self.is_stale = true;
+    }
+
+    /// Disturbs the world from now on.
+    pub fn disturb(&mut self, disturbance: &Disturbance) {
+        let Disturbance { push, velocity, stiffness, is_gone } = *disturbance;
+        self.push = self.axes * Vec3::from(push);
+        let velocity = self.axes * Vec3::from(velocity);
+        self.objects.iter_mut().for_each(|object| object.disturb(velocity, stiffness, is_gone));
     }
 
     /// Returns whether all positions are finite and plausible, so that the simulation is stable.

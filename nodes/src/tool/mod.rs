@@ -3,6 +3,7 @@
 mod arguments;
 mod calibrate;
 mod doctor;
+mod explain;
 mod features;
 mod guided;
 mod new;
@@ -23,6 +24,7 @@ pub fn tool(catalogue: Catalogue) -> Tool {
         .command(derived(features::features))
         .command(derived(calibrate::run))
         .command(derived(doctor::run))
+        .command(derived(explain::run))
         .command(derived(new::run))
         .command(derived(pose::run))
         .command(derived(press::run))

@@ -42,7 +42,7 @@ use shell::{Colour, standard_error};
 pub use clap;
 pub use reference::pages::reference;
 pub use run::{Commissioning, Job, JobOptions, Print, Proof, duration};
-pub use shell::command::{CommandEnd, OutputFormat, Subcommand, derived};
+pub use shell::command::{CommandEnd, GraphArgs, OutputFormat, Subcommand, derived};
 pub use shell::{FAULTED, INTERRUPTED, NOT_LOADED, Shell};
 pub use text::{svg, table::table};
 

@@ -110,6 +110,25 @@ impl fmt::Display for DeviceError {
 
 impl std::error::Error for DeviceError {}
 
+/// What disturbs the world of a simulation. Directions are along the axes of the sensor at the start.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Disturbance {
+    /// Force on the origin of the sensor, as of a hand [N].
+    pub push: [f64; 3],
+    /// Velocity of the objects, beside that of their own [m/s].
+    pub velocity: [f64; 3],
+    /// Factor of the stiffness of the surfaces of the objects [1].
+    pub stiffness: f64,
+    /// Whether the objects are gone.
+    pub is_gone: bool,
+}
+
+impl Default for Disturbance {
+    fn default() -> Self {
+        Self { push: [0.0; 3], velocity: [0.0; 3], stiffness: 1.0, is_gone: false }
+    }
+}
+
 /// A synchronous device: deterministic, without a thread.
 pub trait Stepped: Send {
     /// Returns the time of the next sample from the start of the device [ns], or `None` if there are no more.
@@ -126,6 +145,12 @@ pub trait Stepped: Send {
     /// # Errors
     /// If the device fails. The run ends.
     fn exchange(&mut self, now: i64, commands: &Commands, samples: &mut Samples) -> Result<(), DeviceError>;
+
+    /// Disturbs the simulated world from now on. Returns whether the device simulates one.
+    fn disturb(&mut self, disturbance: &Disturbance) -> bool {
+        let _ = disturbance;
+        false
+    }
 
     /// Receives a flag that is set when the operator ends the run. A device that waits for another program looks at it
     /// while it waits, and soon gives up.

@@ -46,7 +46,7 @@ impl Scenario {
             return Err(Report::new(loader.sources, found));
         };
         match compile_in(loader, catalogue, &request) {
-            Ok(plan) => look_up(&document, request, &plan, catalogue, found),
+            Ok(mut plan) => look_up(&document, request, &mut plan, catalogue, found),
             Err(report) => {
                 found.extend(report.diagnostics);
                 Err(Report::new(report.sources, found))

@@ -22,10 +22,13 @@ use crate::source::{Code, Diagnostic, Item, Report, Value, quoted, suggest_name,
 pub(super) fn look_up(
     document: &Document,
     request: Request,
-    plan: &Compiled,
+    plan: &mut Compiled,
     catalogue: &Catalogue,
     found: Vec<Diagnostic>,
 ) -> Result<Scenario, Report> {
+    let mut wrong = Vec::new();
+    let tables = document.faults.iter().filter_map(|block| block.table.clone());
+    let injections = resolve(tables, plan, &mut wrong);
     let mut lookup = Lookup { plan, found, read: BTreeSet::new() };
     let (mut checks, mut rows) = (Vec::new(), Vec::new());
     for block in &document.checks {
@@ -33,7 +36,7 @@ pub(super) fn look_up(
         checks.push(check);
         rows.extend(its_rows);
     }
-    let injections = resolve(&document.faults, plan, &mut lookup.found);
+    lookup.found.extend(wrong);
     let scenario = document.scenario.as_ref().map(|table| {
         let from = table.from.as_ref().and_then(|word| Some((word.value.clone(), lookup.flag(word)?)));
         let never_lost = table.never_lost.as_ref().and_then(|word| lookup.flag(word));

@@ -34,6 +34,7 @@ const RUNTIME: &[&str] = &[
     "example",
     "record",
     "scenario/inject",
+    "scenario/matrix",
     "scenario",
     "harness",
     "harness/lint",

@@ -140,7 +140,13 @@ impl Agni {
         let port = Connection::open(&self.address, BAUD, None).await?;
         let session = self.session.insert(Session::new(port));
         let Identity { config, serial } = session.greet().await?;
-        self.serial = serial;
+        if let (Some(known), Some(new)) = (&self.serial, &serial)
+            && known != new
+        {
+            // Its calibration and its self-test are those of the device that was there.
+            return Err(Ended::Wrong(format!("another device has come back, with the serial number {new}")));
+        }
+        self.serial = serial.or(self.serial.take());
         let pads: Vec<Pad> = self.pads.iter().map(|port| port.pad.clone()).collect();
         let served = assign(&pads, &config).map_err(Ended::Wrong)?;
         let used = served.iter().enumerate().filter(|(_, pad)| pad.is_some()).map(|(at, _)| at as u8 + 1);

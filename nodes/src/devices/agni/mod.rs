@@ -101,7 +101,7 @@ pub struct Params {
 ///
 /// A frame with a wrong checksum is dropped. After bytes that are no frame, the next frame only shows where frames
 /// begin, and is not used. When the port is gone, or no frame comes for `silence_ms`, the pads are lost, and the device
-/// connects again. It counts `frames`, `rejected frames`, `resyncs`, `skipped bytes`, `bad frames`, `errors of the
+/// connects again. A device with another serial number ends the run: nothing is known of its zeros. It counts `frames`, `rejected frames`, `resyncs`, `skipped bytes`, `bad frames`, `errors of the
 /// device` and `reconnects`. At the end of a run it stops the sensors.
 ///
 /// The unit of the stamps is not documented. With `stamp_unit_ms`, the age of a frame is computed from them. It states

@@ -16,6 +16,9 @@ const DEFAULT_THRESHOLD: f64 = 0.01;
 const STIFFENING: f64 = 8.0;
 /// Largest approach toward what presses on an image of raw readings, if it is not given [m/s].
 const DEFAULT_RAW_APPROACH: f64 = 0.01;
+/// Time constant of a load that falls [s]. A rise is believed at once: a pad whose noise dips below the ceiling would
+/// otherwise press harder with each dip.
+const FALL_S: f64 = 0.1;
 
 /// Reads the load of a pad, and compares it with its ceilings.
 pub(in crate::limits) struct Gauge {
@@ -32,6 +35,8 @@ pub(in crate::limits) struct Gauge {
     threshold: f64,
     /// Compliance of the joints of a compliant arm [rad/(N m)].
     joints: Option<f64>,
+    /// Fraction of a fall of the load that counts with each image [1].
+    fall: f64,
 }
 
 /// What a gauge remembers.
@@ -41,6 +46,8 @@ pub struct Reading {
     stamp: Option<Stamp>,
     /// Load of that image.
     load: PadLoad,
+    /// The load with its falls low-passed.
+    held: PadLoad,
 }
 
 /// A load of the pad, and what it allows.
@@ -88,7 +95,16 @@ impl Gauge {
         let max_age = max_age(params.max_age_ms, sample_period);
         let threshold = params.threshold.unwrap_or(DEFAULT_THRESHOLD * peak.load);
         let joints = params.joint_n_m_per_rad.filter(|_| shape.unit == Unit::NEWTON).map(f64::recip);
-        Ok(Self { force, peak, shape: shape.clone(), period, max_age, threshold, joints })
+        Ok(Self {
+            force,
+            peak,
+            shape: shape.clone(),
+            period,
+            max_age,
+            threshold,
+            joints,
+            fall: sample_period / (FALL_S + sample_period),
+        })
     }
 
     /// Whether the image has raw readings, so that nothing is limited in newtons.
@@ -121,6 +137,7 @@ impl Gauge {
         if image.is_new() || reading.stamp != Some(stamp) {
             reading.stamp = Some(stamp);
             reading.load = load(image);
+            reading.held = reading.load.held(reading.held, self.fall);
         }
         let delay = stamp.age(tick.now) as f64 * 1e-9 + 2.0 * self.period.max(tick.dt);
         let PadLoad { sum, peak } = reading.load;
@@ -128,12 +145,13 @@ impl Gauge {
         // Before the touch the mass of the arm counts, and not its spring.
         let gives_way = self.joints.zip(arm).filter(|_| touches);
         let compliance = gives_way.map_or(0.0, |(joints, (pose, jacobian))| joints * gain(pose, jacobian));
-        let pressed = |ceiling: &Ceiling, load: f64, place: Place| Pressed {
+        let pressed = |ceiling: &Ceiling, load: f64, held: f64, place: Place| Pressed {
             load,
-            allowed: ceiling.in_series(compliance).allowed_speed(load, delay),
+            allowed: ceiling.in_series(compliance).allowed_speed(held, delay),
             at: if touches { place } else { Place::Anywhere },
         };
-        [pressed(&self.force, sum, Place::Centre), pressed(&self.peak, peak, Place::Highest)]
+        let held = reading.held;
+        [pressed(&self.force, sum, held.sum, Place::Centre), pressed(&self.peak, peak, held.peak, Place::Highest)]
     }
 
     /// Returns where a load is on the pad [m]; `None` if that can be anywhere.

@@ -11,6 +11,16 @@ pub struct PadLoad {
     pub peak: f64,
 }
 
+impl PadLoad {
+    /// Returns this load, low-passed where it is less than the `last` one: the fraction `fall` of a fall counts. It keeps
+    /// a NaN.
+    #[must_use]
+    pub fn held(self, last: Self, fall: f64) -> Self {
+        let held = |last: f64, new: f64| if new < last { last + (new - last) * fall } else { new };
+        Self { sum: held(last.sum, self.sum), peak: held(last.peak, self.peak) }
+    }
+}
+
 /// Returns the load of an image; its sum is NaN if a tactel is.
 ///
 /// It adds up in eight lanes and a fixed order: the same bits on every machine.

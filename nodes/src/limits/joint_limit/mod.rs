@@ -19,6 +19,9 @@ pub use limiter::Limiter;
 /// springs to it when it is released, by at most `lead_rad`. Ranges apply to the position and to the equilibrium. A
 /// joint outside its range can only move back.
 ///
+/// It alone guarantees the limits of the joints, whatever computes the velocities. `ik_sink` plans within the same speeds
+/// and ranges, with a longer delay, so that the planned motion is seldom scaled again.
+///
 /// Velocities that are too fast are scaled as a whole and keep their direction. The output then follows on a straight
 /// line, as far as the accelerations allow. Only a joint that cannot brake in time with the others brakes by itself.
 ///

@@ -9,7 +9,9 @@ mod check;
 use std::borrow::Cow;
 
 use nalgebra::IsometryMatrix3;
-use tactflow_runtime::device::{Commands, Description, Device, DeviceError, Driver, Opened, Output, Samples, Stepped};
+use tactflow_runtime::device::{
+    Commands, Description, Device, DeviceError, Disturbance, Driver, Opened, Output, Samples, Stepped,
+};
 use tactflow_runtime::node::{Describe, Mistakes, Param, PortSpec};
 use tactflow_runtime::signal::{Image, ImageShape, Joint, Kind, Pose, Scalar, ScalarShape, Unit};
 
@@ -211,6 +213,11 @@ impl Stepped for SimBench {
 
     fn end(&self) -> Option<i64> {
         self.beats.end()
+    }
+
+    fn disturb(&mut self, disturbance: &Disturbance) -> bool {
+        self.world.disturb(disturbance);
+        true
     }
 
     fn exchange(&mut self, now: i64, commands: &Commands, samples: &mut Samples) -> Result<(), DeviceError> {

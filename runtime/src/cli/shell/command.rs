@@ -70,14 +70,14 @@ impl Subcommand {
 }
 
 /// The bench of a graph, and values that replace those of its files.
-#[derive(Args)]
-pub(crate) struct GraphArgs {
+#[derive(Debug, Args)]
+pub struct GraphArgs {
     /// Use this bench instead of the one that the graph names
     #[arg(long, value_name = "FILE")]
-    pub(crate) bench: Option<PathBuf>,
+    pub bench: Option<PathBuf>,
     /// Replace a value of the graph or its bench, for example nodes.pid.gains.x.kp=3; may be repeated
     #[arg(long, value_name = "KEY=VALUE")]
-    pub(crate) set: Vec<String>,
+    pub set: Vec<String>,
 }
 
 impl GraphArgs {
@@ -87,7 +87,8 @@ impl GraphArgs {
     }
 
     /// Returns the request to load a graph with these arguments.
-    pub(crate) fn request(&self, graph: PathBuf) -> Request {
+    #[must_use]
+    pub fn request(&self, graph: PathBuf) -> Request {
         Request { graph, bench: self.bench.clone(), set: self.set.clone(), ..Request::default() }
     }
 }

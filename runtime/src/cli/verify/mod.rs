@@ -1,5 +1,6 @@
-//! `verify`: runs scenarios in parallel and compares the results with their checks.
+//! `verify`: runs scenarios in parallel and compares the results with their checks, or tries the faults of a task.
 
+mod faults;
 mod table;
 mod verified;
 
@@ -16,7 +17,7 @@ use super::shell::patience::Patience;
 use super::shell::{FAULTED, NOT_LOADED, Shell};
 use crate::catalogue::Catalogue;
 use crate::engine::Interrupt;
-use crate::scenario::{NotChecked, Scenario, Trial};
+use crate::scenario::{NotChecked, Scenario};
 
 /// Run scenarios and check their results
 #[derive(clap::Parser)]
@@ -26,13 +27,29 @@ use crate::scenario::{NotChecked, Scenario, Trial};
   tactflow verify graphs/scenarios
   tactflow verify graphs/scenarios/table1_ball.toml --seeds 50 --out records
   tactflow verify graphs/scenarios --json > figures.json
+  tactflow verify --faults graphs/force.toml --only 'object gone'
 
 Exit codes: 0 every check passed; 1 a check failed, or a run ended in a fault; 2 a scenario does not load."
 )]
 pub(crate) struct VerifyArgs {
     /// Scenario files, or folders of scenario files
-    #[arg(required = true)]
+    #[arg(required_unless_present = "faults")]
     paths: Vec<PathBuf>,
+    /// Attack this task with every fault in every phase, growing until the outcome changes
+    #[arg(long, value_name = "GRAPH", conflicts_with_all = ["paths", "seeds", "out"])]
+    faults: Option<PathBuf>,
+    /// Bench for `--faults`, instead of the one of the task
+    #[arg(long, value_name = "FILE", requires = "faults")]
+    bench: Option<PathBuf>,
+    /// Seed for `--faults` [default: 1]
+    #[arg(long, value_name = "N", requires = "faults")]
+    seed: Option<u64>,
+    /// Fault for `--faults`, instead of all; several are allowed
+    #[arg(long, value_name = "FAULT", requires = "faults")]
+    only: Vec<String>,
+    /// Phase for `--faults`, instead of all; several are allowed
+    #[arg(long, value_name = "PHASE", requires = "faults")]
+    phase: Vec<String>,
     /// Run each scenario that has `seeds` with the seeds 1 to N instead of its own
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..=10_000))]
     seeds: Option<u64>,
@@ -50,14 +67,24 @@ pub(crate) struct VerifyArgs {
     format: OutputFormat,
 }
 
+impl VerifyArgs {
+    fn is_json(&self) -> bool {
+        self.json || self.format == OutputFormat::Json
+    }
+}
+
 pub(crate) fn verify(args: VerifyArgs, shell: &Shell) -> u8 {
-    verify_all(&args, shell).unwrap_or_else(|message| shell.refuse(message))
+    let done = match &args.faults {
+        Some(graph) => faults::verify_faults(graph, &args, shell),
+        None => verify_all(&args, shell),
+    };
+    done.unwrap_or_else(|message| shell.refuse(message))
 }
 
 fn verify_all(args: &VerifyArgs, shell: &Shell) -> Result<u8, String> {
     let mut all = prepare(args, shell.catalogue())?;
     let is_complete = run(&mut all, args, shell)?;
-    if args.json || args.format == OutputFormat::Json {
+    if args.is_json() {
         shell.say_json(&table::json(&all));
     } else {
         all.iter().filter_map(|verified| verified.loaded.as_ref().err()).for_each(|report| shell.show(report));
@@ -134,21 +161,43 @@ fn run(all: &mut [Verified], args: &VerifyArgs, shell: &Shell) -> Result<bool, S
         seeds.into_iter().map(move |seed| (i, seed))
     };
     let work: Vec<PendingRun> = all.iter().enumerate().flat_map(runs).collect();
-    let cores = std::thread::available_parallelism().map_or(1, usize::from);
-    let jobs = args.jobs.map_or(cores, |jobs| jobs as usize).min(work.len());
-    let (next, done) = (AtomicUsize::new(0), AtomicUsize::new(0));
-    let trials: Vec<OnceLock<Trial>> = work.iter().map(|_| OnceLock::new()).collect();
-    let one = |(scenario, seed): PendingRun| {
+    let one = |i: usize| {
+        let (scenario, seed) = work[i];
         let verified = &all[scenario];
         let record = args.out.as_deref().map(|folder| folder.join(record_name(&verified.name(), seed)));
         let scenario = verified.loaded.as_ref().ok()?;
-        let trial = scenario.run(shell.catalogue(), seed, record.as_deref(), &|| interrupt.is_requested());
-        shell.draw(&format!("{} of {} runs", done.fetch_add(1, Ordering::Relaxed) + 1, work.len()));
-        trial
+        scenario.run(shell.catalogue(), seed, record.as_deref(), &|| interrupt.is_requested())
     };
+    let trials = in_parallel(work.len(), "runs", args.jobs, shell, &one);
+    shell.set_patience(&patience.after_run());
+    let is_complete = trials.iter().all(|trial| trial.get().is_some());
+    for ((scenario, _), trial) in work.iter().zip(trials) {
+        all[*scenario].trials.extend(trial.into_inner());
+    }
+    for verified in all {
+        verified.rows = verified.loaded.iter().flat_map(|scenario| scenario.rows(&verified.trials)).collect();
+    }
+    Ok(is_complete)
+}
+
+/// Does a piece of work for each number below `count` in parallel, and draws how many are done. What was interrupted has
+/// no result.
+fn in_parallel<T: Send + Sync>(
+    count: usize,
+    what: &str,
+    jobs: Option<u64>,
+    shell: &Shell,
+    one: &(dyn Fn(usize) -> Option<T> + Sync),
+) -> Vec<OnceLock<T>> {
+    let cores = std::thread::available_parallelism().map_or(1, usize::from);
+    let jobs = jobs.map_or(cores, |jobs| jobs as usize).min(count);
+    let (next, done) = (AtomicUsize::new(0), AtomicUsize::new(0));
+    let results: Vec<OnceLock<T>> = (0..count).map(|_| OnceLock::new()).collect();
     let worker = || {
-        while let Some(which) = Some(next.fetch_add(1, Ordering::Relaxed)).filter(|which| *which < work.len()) {
-            one(work[which]).map(|trial| trials[which].set(trial));
+        while let Some(i) = Some(next.fetch_add(1, Ordering::Relaxed)).filter(|i| *i < count) {
+            let result = one(i);
+            shell.draw(&format!("{} of {count} {what}", done.fetch_add(1, Ordering::Relaxed) + 1));
+            result.map(|result| results[i].set(result));
         }
     };
     without_panic_messages(|| {
@@ -158,16 +207,8 @@ fn run(all: &mut [Verified], args: &VerifyArgs, shell: &Shell) -> Result<bool, S
             joined.for_each(|end| end.unwrap_or_else(|panic| std::panic::resume_unwind(panic)));
         });
     });
-    shell.set_patience(&patience.after_run());
     shell.draw("");
-    let is_complete = trials.iter().all(|trial| trial.get().is_some());
-    for ((scenario, _), trial) in work.iter().zip(trials) {
-        all[*scenario].trials.extend(trial.into_inner());
-    }
-    for verified in all {
-        verified.rows = verified.loaded.iter().flat_map(|scenario| scenario.rows(&verified.trials)).collect();
-    }
-    Ok(is_complete)
+    results
 }
 
 fn record_name(scenario: &str, seed: Option<u64>) -> String {

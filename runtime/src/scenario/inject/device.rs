@@ -1,16 +1,17 @@
-//! A device whose images are spoilt before the graph sees them.
+//! A device with faults.
 
-use std::collections::VecDeque;
 use std::sync::atomic::AtomicBool;
 
 use super::cells::draw;
+use super::commands::SpoiltCommand;
 use super::fault::Fault;
-use super::resolve::Injection;
-use super::table::{Cells, FaultKind};
-use crate::device::{Commands, DeviceError, Driver, Output, SampleState, Samples, Stepped};
+use super::images::SpoiltImage;
+use super::resolve::{Injection, Target};
+use super::table::{Cells, InjectTable};
+use crate::device::{Commands, DeviceError, Disturbance, Driver, SampleState, Samples, Stepped};
 use crate::graph::Compiled;
 use crate::random::Random;
-use crate::signal::{Image, Signal};
+use crate::signal::ImageShape;
 
 /// Wraps the devices of a compiled graph that the faults of a scenario spoil. The seed decides everything random.
 pub(crate) fn inject(compiled: &mut Compiled, injections: &[Injection], seed: u64) {
@@ -47,115 +48,91 @@ pub(super) struct Spoilt {
     inner: Box<dyn Stepped>,
     /// The samples of the device, as it has written them.
     own: Samples,
+    /// The commands, as the device got them last.
+    sent: Option<Commands>,
     /// For each output, how often it was written and lost when it was last passed on.
     seen: Vec<[u64; 2]>,
     images: Vec<SpoiltImage>,
-    /// Number of frames that a fault has hit.
+    commands: Vec<SpoiltCommand>,
+    /// The faults of its world, and what they did last.
+    world: (Vec<Fault>, Disturbance),
+    /// Number of frames and commands that a fault has hit.
     hits: u64,
 }
 
-/// An image with faults.
-struct SpoiltImage {
-    port: usize,
-    faults: Vec<Fault>,
-    /// The values that were passed on last, if there are any.
-    last: Vec<f32>,
-    has_last: bool,
-    /// Frames that arrive later: their time of arrival, stamp, number and values.
-    late: VecDeque<Late>,
-    /// Buffers of frames that have arrived.
-    spare: Vec<Vec<f32>>,
+/// Returns the cells that an entry lists, as indices.
+fn listed(table: &InjectTable, shape: &ImageShape) -> Vec<usize> {
+    match table.cells.as_ref().map(|cells| &cells.value) {
+        Some(Cells::List(list)) => list.iter().map(|[i, j]| i * shape.cols + j).collect(),
+        _ => Vec::new(),
+    }
 }
 
-/// A frame on its way.
-struct Late {
-    due: i64,
-    stamp: i64,
-    sequence: u64,
-    cells: Vec<f32>,
+/// Returns the entry of a list that has a port, which is added if there is none.
+fn of_port<T>(list: &mut Vec<T>, is_it: impl Fn(&T) -> bool, new: impl FnOnce() -> T) -> &mut T {
+    let at = list.iter().position(is_it).unwrap_or_else(|| {
+        list.push(new());
+        list.len() - 1
+    });
+    &mut list[at]
 }
 
 impl Spoilt {
     pub(super) fn new(inner: Box<dyn Stepped>, own: Samples, injections: &[(usize, &Injection)], seed: u64) -> Self {
-        let mut images: Vec<SpoiltImage> = Vec::new();
-        let mut taken: Vec<Vec<usize>> = Vec::new();
-        let listed = |one: &Injection| match one.table.cells.as_ref().map(|cells| &cells.value) {
-            Some(Cells::List(list)) => list.iter().map(|[i, j]| i * one.shape.cols + j).collect(),
-            _ => Vec::new(),
-        };
+        let (mut images, mut commands, mut world) = (Vec::new(), Vec::new(), Vec::new());
+        let mut taken: Vec<(usize, Vec<usize>)> = Vec::new();
         for (_, one) in injections {
-            let image = images.iter().position(|image| image.port == one.port).unwrap_or_else(|| {
-                images.push(SpoiltImage::new(one.port, one.shape.tactels()));
-                taken.push(Vec::new());
-                images.len() - 1
-            });
-            taken[image].extend::<Vec<usize>>(listed(one));
+            if let Target::Image(port, shape) = &one.target {
+                let taken = of_port(&mut taken, |(known, _)| known == port, || (*port, Vec::new()));
+                taken.1.extend(listed(&one.table, shape));
+            }
         }
         for (number, one) in injections {
-            let image = images.iter().position(|image| image.port == one.port).expect("it was added above");
-            let mut random = Random::new(seed, *number as u64);
-            let cells = match one.table.cells.as_ref().map(|cells| &cells.value) {
-                Some(Cells::Count(count)) => {
-                    draw(*count, [one.shape.rows, one.shape.cols], &mut taken[image], &mut random)
+            let (table, mut random) = (&one.table, Random::new(seed, *number as u64));
+            match &one.target {
+                Target::Image(port, shape) => {
+                    let taken = of_port(&mut taken, |(known, _)| known == port, || (*port, Vec::new()));
+                    let cells = match table.cells.as_ref().map(|cells| &cells.value) {
+                        Some(Cells::Count(count)) => draw(*count, [shape.rows, shape.cols], &mut taken.1, &mut random),
+                        _ => listed(table, shape),
+                    };
+                    let new = || SpoiltImage::new(*port, shape.tactels());
+                    let image = of_port(&mut images, |known: &SpoiltImage| known.port == *port, new);
+                    image.faults.push(Fault::new(table, cells, random));
                 }
-                _ => listed(one),
-            };
-            images[image].faults.push(Fault::new(&one.table, cells, random));
+                Target::Command(port, joints) => {
+                    let new = || SpoiltCommand::new(*port);
+                    let command = of_port(&mut commands, |known: &SpoiltCommand| known.port == *port, new);
+                    command.faults.push(Fault::new(table, joints.clone(), random));
+                }
+                Target::World => world.push(Fault::new(table, Vec::new(), random)),
+            }
         }
         let seen = vec![[0; 2]; own.ports.len()];
-        Self { inner, own, seen, images, hits: 0 }
-    }
-}
-
-impl SpoiltImage {
-    fn new(port: usize, tactels: usize) -> Self {
-        let (late, spare) = (VecDeque::new(), Vec::new());
-        Self { port, faults: Vec::new(), last: vec![0.0; tactels], has_last: false, late, spare }
+        Self { inner, own, sent: None, seen, images, commands, world: (world, Disturbance::default()), hits: 0 }
     }
 
-    /// Takes a new frame of the device. Returns how many faults have hit it.
-    fn take(&mut self, now: i64, own: &Samples, samples: &mut Samples) -> u64 {
-        let sample = &own.ports[self.port];
-        let (stamp, sequence) = (sample.stamp, sample.sequence);
-        let mut cells = self.spare.pop().unwrap_or_default();
-        cells.clear();
-        cells.extend_from_slice(Image::arena(&own.arenas)[sample.slot as usize].cells());
-        let (mut hits, mut delay, mut is_missing, mut is_repeated) = (0, 0, false, false);
-        for fault in &mut self.faults {
-            let Some(kind) = fault.hits(stamp) else { continue };
-            hits += 1;
-            is_missing |= kind == FaultKind::Missing;
-            is_repeated |= kind == FaultKind::Repeat;
-            delay += fault.delay;
-            fault.spoil(kind, stamp, &mut cells);
+    /// Disturbs the world and spoils the commands, so that the device sees what is left of them.
+    fn send(&mut self, now: i64, commands: &Commands) {
+        let (faults, last) = &mut self.world;
+        let mut disturbance = Disturbance::default();
+        faults.iter().for_each(|fault| fault.disturb(now, &mut disturbance));
+        if std::mem::replace(last, disturbance) != disturbance {
+            self.inner.disturb(&disturbance);
         }
-        if is_repeated && self.has_last {
-            cells.copy_from_slice(&self.last);
+        let own = self.sent.get_or_insert_with(|| {
+            let mut first = commands.clone();
+            first.rest();
+            first
+        });
+        own.grant = commands.grant;
+        own.copy_reports(commands);
+        for (port, (values, sent)) in own.values.iter_mut().zip(&commands.values).enumerate() {
+            match self.commands.iter_mut().find(|command| command.port == port) {
+                Some(command) => self.hits += command.deliver(now, sent, values),
+                None => values.copy_from_slice(sent),
+            }
         }
-        if is_missing {
-            self.spare.push(cells);
-            return hits;
-        }
-        self.last.copy_from_slice(&cells);
-        self.has_last = true;
-        if delay == 0 && self.late.is_empty() {
-            samples.write(Output::<Image>::at(self.port), stamp, sequence).cells_mut().copy_from_slice(&cells);
-            self.spare.push(cells);
-        } else {
-            self.late.push_back(Late { due: now + delay, stamp, sequence, cells });
-        }
-        hits
-    }
-
-    /// Passes on the newest of the frames that have arrived by now. It overtakes the frames before it.
-    fn deliver(&mut self, now: i64, samples: &mut Samples) {
-        let Some(newest) = self.late.iter().rposition(|frame| frame.due <= now) else { return };
-        for _ in 0..newest {
-            self.spare.extend(self.late.pop_front().map(|frame| frame.cells));
-        }
-        let Some(Late { stamp, sequence, cells, .. }) = self.late.pop_front() else { return };
-        samples.write(Output::<Image>::at(self.port), stamp, sequence).cells_mut().copy_from_slice(&cells);
-        self.spare.push(cells);
     }
 }
 
@@ -169,20 +146,23 @@ impl Stepped for Spoilt {
     }
 
     fn exchange(&mut self, now: i64, commands: &Commands, samples: &mut Samples) -> Result<(), DeviceError> {
-        let result = self.inner.exchange(now, commands, &mut self.own);
-        for port in 0..self.own.ports.len() {
-            let sample = &self.own.ports[port];
+        self.send(now, commands);
+        let sent = self.sent.as_ref().unwrap_or(commands);
+        let result = self.inner.exchange(now, sent, &mut self.own);
+        let own = &self.own;
+        for port in 0..own.ports.len() {
+            let sample = &own.ports[port];
             let written = [sample.writes, sample.losses];
             let is_value = sample.state == SampleState::Value;
             let is_new = std::mem::replace(&mut self.seen[port], written) != written;
             match self.images.iter_mut().find(|image| image.port == port) {
-                Some(image) if is_new && is_value => self.hits += image.take(now, &self.own, samples),
-                None | Some(_) if is_new => samples.pass_on(&self.own, port),
+                Some(image) if is_new && is_value => self.hits += image.take(now, own, samples),
+                None | Some(_) if is_new => samples.pass_on(own, port),
                 _ => {}
             }
         }
         self.images.iter_mut().for_each(|image| image.deliver(now, samples));
-        samples.take_counts(&self.own, ("injected faults", self.hits));
+        samples.take_counts(own, ("injected faults", self.hits));
         result
     }
 

@@ -1,12 +1,13 @@
-//! What a fault does to one image.
+//! What a fault does to one image, to one command or to the world.
 
 use super::table::{FaultKind, InjectTable};
+use crate::device::Disturbance;
 use crate::random::Random;
 
 /// A fault of a run.
 pub(super) struct Fault {
     kind: FaultKind,
-    /// The cells that it concerns.
+    /// The cells or joints that it concerns.
     cells: Vec<usize>,
     /// Value of a cell, factor or speed, as the fault needs it.
     number: f64,
@@ -14,8 +15,10 @@ pub(super) struct Fault {
     rate: Option<f64>,
     /// Number of frames that are still hit, if they are counted.
     left: u64,
+    /// Force [N] or velocity [m/s] in the world.
+    vector: [f64; 3],
     /// Time by which frames arrive later [ns].
-    pub(super) delay: i64,
+    delay: i64,
     /// Times between which it is there [ns].
     from: i64,
     to: i64,
@@ -35,6 +38,7 @@ impl Fault {
             kind: table.fault.value,
             cells,
             number: reading.or(table.factor).or(table.reading_per_s).unwrap_or(0.0),
+            vector: table.push_n.or(table.velocity_m_per_s).unwrap_or_default(),
             rate: table.rate,
             left: table.frames.unwrap_or(0),
             delay: table.delay_ms.map_or(0, |ms| nanos(ms * 1e-3)),
@@ -44,15 +48,14 @@ impl Fault {
         }
     }
 
-    /// Returns its kind if it hits the frame that was sampled at `stamp` [ns]. Call it once for each frame.
+    /// Returns its kind if it hits the frame that was sampled at `stamp` [ns], or the command of that time. Call it once
+    /// for each.
     pub(super) fn hits(&mut self, stamp: i64) -> Option<FaultKind> {
         if !(self.from..self.to).contains(&stamp) {
             return None;
         }
         let is_hit = match (self.kind, self.rate) {
-            (FaultKind::Nan | FaultKind::Spike | FaultKind::Garbage | FaultKind::Repeat | FaultKind::Missing, None) => {
-                self.left > 0
-            }
+            (kind, None) if kind.is_of_frames() => self.left > 0,
             (_, Some(rate)) => self.random.uniform(0.0, 1.0) < rate,
             (_, None) => true,
         };
@@ -81,7 +84,35 @@ impl Fault {
             FaultKind::Garbage => {
                 image.iter_mut().for_each(|cell| *cell = self.random.uniform(0.0, self.number) as f32);
             }
-            FaultKind::Repeat | FaultKind::Missing | FaultKind::Late => {}
+            FaultKind::Swapped => self.cells.windows(2).for_each(|pair| image.swap(pair[0], pair[1])),
+            _ => {}
+        }
+    }
+
+    /// Returns by how much later a frame or a command arrives [ns].
+    pub(super) fn delay(&mut self, kind: FaultKind) -> i64 {
+        if kind == FaultKind::Jitter { self.random.uniform(0.0, self.delay as f64) as i64 } else { self.delay }
+    }
+
+    /// Stops its joints, if the fault concerns them.
+    pub(super) fn stop(&self, kind: FaultKind, command: &mut [f64]) {
+        if kind == FaultKind::JointStop {
+            self.cells.iter().for_each(|joint| command[*joint] = 0.0);
+        }
+    }
+
+    /// Adds what it does to the world at `now` [ns].
+    pub(super) fn disturb(&self, now: i64, world: &mut Disturbance) {
+        if !(self.from..self.to).contains(&now) {
+            return;
+        }
+        let add = |sum: &mut [f64; 3]| sum.iter_mut().zip(self.vector).for_each(|(sum, value)| *sum += value);
+        match self.kind {
+            FaultKind::Push => add(&mut world.push),
+            FaultKind::Moving => add(&mut world.velocity),
+            FaultKind::Stiff => world.stiffness *= self.number,
+            FaultKind::Gone => world.is_gone = true,
+            _ => {}
         }
     }
 }

@@ -1,30 +1,54 @@
-//! Checks the faults of a scenario with its task on its bench: their roles, their cells and their units.
+//! Checks the faults of a scenario with its task on its bench: their roles, their cells, their joints and their units.
 
-use super::table::{Cells, InjectBlock, InjectTable};
+use super::table::{Cells, InjectTable, Spoils};
+use crate::device::{Disturbance, Driver};
 use crate::graph::{Compiled, into_diagnostic};
 use crate::signal::{ImageShape, Shape};
 use crate::source::{Code, Diagnostic, quoted};
 
-/// A checked fault, and the image that it spoils.
+/// A checked fault, and what it spoils.
 #[derive(Debug, Clone)]
 pub(crate) struct Injection {
     /// Index of the device.
     pub(super) device: usize,
-    /// Index of the output among those of the device.
-    pub(super) port: usize,
-    /// Shape of the image.
-    pub(super) shape: ImageShape,
+    pub(super) target: Target,
     /// The fault. Its numbers are in the unit of the image.
     pub(super) table: InjectTable,
 }
 
-/// Resolves the faults of a scenario. Mistakes are added to `found`.
-pub(crate) fn resolve(blocks: &[InjectBlock], compiled: &Compiled, found: &mut Vec<Diagnostic>) -> Vec<Injection> {
-    let tables = blocks.iter().filter_map(|block| block.table.clone());
-    tables.filter_map(|table| one(table, compiled).map_err(|diagnostic| found.push(*diagnostic)).ok()).collect()
+/// What a fault spoils.
+#[derive(Debug, Clone)]
+pub(super) enum Target {
+    /// An image: the index of the output among those of the device, and its shape.
+    Image(usize, ImageShape),
+    /// A command: its index among those of the device, and the indices of the joints that stop.
+    Command(usize, Vec<usize>),
+    /// The world that the device simulates.
+    World,
 }
 
-fn one(mut table: InjectTable, compiled: &Compiled) -> Result<Injection, Box<Diagnostic>> {
+/// Resolves the faults of a scenario. Mistakes are added to `found`.
+pub(crate) fn resolve(
+    tables: impl IntoIterator<Item = InjectTable>,
+    compiled: &mut Compiled,
+    found: &mut Vec<Diagnostic>,
+) -> Vec<Injection> {
+    let mut injections = Vec::new();
+    for table in tables {
+        let one = match table.fault.value.spoils() {
+            Spoils::Images => of_image(table, compiled),
+            Spoils::Commands => of_command(table, compiled),
+            Spoils::World => of_world(table, compiled),
+        };
+        match one {
+            Ok(injection) => injections.push(injection),
+            Err(diagnostic) => found.push(*diagnostic),
+        }
+    }
+    injections
+}
+
+fn of_image(mut table: InjectTable, compiled: &Compiled) -> Result<Injection, Box<Diagnostic>> {
     let images = compiled.plan.roles.iter().flat_map(|role| {
         let ports = role.ports.iter().zip(&role.numbers);
         ports.filter_map(move |(port, number)| match &port.shape {
@@ -47,7 +71,62 @@ fn one(mut table: InjectTable, compiled: &Compiled) -> Result<Injection, Box<Dia
     if let Some(reading) = &mut table.reading {
         reading.settle(Some(shape.unit), &mut Vec::new()).map_err(into_diagnostic)?;
     }
-    Ok(Injection { device, port, shape, table })
+    Ok(Injection { device, target: Target::Image(port, shape), table })
+}
+
+fn of_command(table: InjectTable, compiled: &Compiled) -> Result<Injection, Box<Diagnostic>> {
+    let commands = compiled.plan.commands.iter().filter(|command| !command.is_report);
+    let name = &table.role.value;
+    let Some(command) = commands.clone().find(|command| command.name[0] == *name) else {
+        let names: Vec<&str> = commands.map(|command| command.name[0].as_str()).collect();
+        let message = format!("the task commands no role `{name}`, and `{}` spoils commands", table.fault.value.word());
+        let diagnostic = Diagnostic::new(Code::WrongRole, table.role.span.clone(), message);
+        return Err(Box::new(match names[..] {
+            [] => diagnostic.help("remove this fault"),
+            _ => diagnostic.suggest(name, names.iter().copied(), "commanded roles"),
+        }));
+    };
+    let names: Vec<&str> = match &command.shape {
+        Shape::Joints(shape) => shape.joints.iter().map(|joint| joint.name.as_str()).collect(),
+        _ => Vec::new(),
+    };
+    let mut stopped = Vec::new();
+    for joint in table.joints.iter().flat_map(|joints| &joints.value) {
+        let Some(index) = names.iter().position(|known| known == joint) else {
+            let span = table.joints.as_ref().map_or(0..0, |joints| joints.span.clone());
+            let message = format!("the arm `{name}` has no joint `{joint}`");
+            return Err(Diagnostic::new(Code::BadValue, span, message)
+                .suggest(joint, names.into_iter(), "joints")
+                .into());
+        };
+        stopped.push(index);
+    }
+    Ok(Injection { device: command.device, target: Target::Command(command.port, stopped), table })
+}
+
+fn of_world(table: InjectTable, compiled: &mut Compiled) -> Result<Injection, Box<Diagnostic>> {
+    let (name, span) = (&table.role.value, table.role.span.clone());
+    let Some(device) = compiled.plan.roles.iter().find(|role| role.name == *name).map(|role| role.device) else {
+        let names: Vec<&str> = compiled.plan.roles.iter().map(|role| role.name.as_str()).collect();
+        let diagnostic = Diagnostic::new(Code::WrongRole, span, format!("there is no role `{name}` in this task"));
+        return Err(diagnostic.suggest(name, names.into_iter(), "roles").into());
+    };
+    let planned = &mut compiled.plan.devices[device];
+    let is_simulated = match &mut planned.driver {
+        Driver::Stepped(driver) | Driver::Lockstep(driver) => driver.disturb(&Disturbance::default()),
+        Driver::Live(_) => false,
+    };
+    if !is_simulated {
+        let message = format!(
+            "the device `{}` of `{name}` simulates no world that can be disturbed, as `{}` does",
+            planned.name,
+            table.fault.value.word()
+        );
+        let help =
+            "use a bench whose device simulates one, such as `builtin:benches/simulated.toml`, or remove this fault";
+        return Err(Diagnostic::new(Code::WrongRole, span, message).help(help).into());
+    }
+    Ok(Injection { device, target: Target::World, table })
 }
 
 /// Reports a role that does not exist, or that has no image.

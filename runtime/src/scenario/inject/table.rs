@@ -8,7 +8,7 @@ use crate::source::{Code, Diagnostic, Item, Table, Value, quoted};
 /// One fault of a scenario.
 #[derive(Debug, Clone, Param)]
 pub(crate) struct InjectTable {
-    /// Role whose images the fault spoils.
+    /// Role whose images or commands the fault spoils, or whose device simulates the world that it disturbs.
     pub(crate) role: Spanned<String>,
     /// Kind of the fault.
     pub(crate) fault: Spanned<FaultKind>,
@@ -16,20 +16,28 @@ pub(crate) struct InjectTable {
     pub(crate) cells: Option<Spanned<Cells>>,
     /// Value of a cell that is `stuck` or has a `spike`, and the largest value of `garbage`, in the unit of the image.
     pub(crate) reading: Option<Amount>,
-    /// Factor of `gain`.
+    /// Factor of `gain`, or of the stiffness of the objects.
     #[param(unit = "1", range = 0.0..)]
     pub(crate) factor: Option<f64>,
     /// Speed of `drift`, in the unit of the image per second.
     pub(crate) reading_per_s: Option<f64>,
-    /// Fraction of the frames that are hit, at random.
+    /// Fraction of the frames or commands that are hit, at random.
     #[param(unit = "1", range = 0.0..=1.0)]
     pub(crate) rate: Option<f64>,
-    /// Number of frames that are hit: the first ones from `from_s` on.
+    /// Number of frames or commands that are hit: the first ones from `from_s` on.
     #[param(range = 1..=1_000_000)]
     pub(crate) frames: Option<u64>,
-    /// Time by which frames arrive later.
+    /// Time by which frames or commands arrive later; for `jitter`, the longest one.
     #[param(unit = "ms", above = 0.0)]
     pub(crate) delay_ms: Option<f64>,
+    /// Names of the joints that do not move.
+    pub(crate) joints: Option<Spanned<Vec<String>>>,
+    /// Force of a `push` on the sensor, in its axes at the start.
+    #[param(unit = "N")]
+    pub(crate) push_n: Option<[f64; 3]>,
+    /// Velocity of the objects that are `moving`, in the axes of the sensor at the start.
+    #[param(unit = "m/s")]
+    pub(crate) velocity_m_per_s: Option<[f64; 3]>,
     /// Time from which the fault is there.
     #[param(unit = "s", range = 0.0.., default = 0.0)]
     pub(crate) from_s: f64,
@@ -61,6 +69,24 @@ pub(crate) enum FaultKind {
     Missing,
     /// Frames arrive late, with their old stamps.
     Late,
+    /// Frames arrive late, each by a random time.
+    Jitter,
+    /// Cells exchange their values.
+    Swapped,
+    /// Some commands do not arrive: the device follows the one before.
+    Lost,
+    /// Commands arrive late.
+    Lag,
+    /// Joints do not follow their commands.
+    JointStop,
+    /// A hand pushes the sensor.
+    Push,
+    /// The objects are gone.
+    Gone,
+    /// The objects have another stiffness.
+    Stiff,
+    /// The objects move.
+    Moving,
 }
 
 /// Cells of an image.
@@ -85,10 +111,40 @@ impl Param for Cells {
 }
 
 /// The keys that only some faults have.
-const KEYS: [&str; 7] = ["cells", "reading", "factor", "reading_per_s", "delay_ms", "rate", "frames"];
+const KEYS: [&str; 10] = [
+    "cells",
+    "reading",
+    "factor",
+    "reading_per_s",
+    "delay_ms",
+    "joints",
+    "push_n",
+    "velocity_m_per_s",
+    "rate",
+    "frames",
+];
+
+/// What a fault spoils.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Spoils {
+    /// The images of a role.
+    Images,
+    /// The commands of a role.
+    Commands,
+    /// The world that a device simulates.
+    World,
+}
 
 impl FaultKind {
-    const fn word(self) -> &'static str {
+    pub(crate) const fn spoils(self) -> Spoils {
+        match self {
+            Self::Lost | Self::Lag | Self::JointStop => Spoils::Commands,
+            Self::Push | Self::Gone | Self::Stiff | Self::Moving => Spoils::World,
+            _ => Spoils::Images,
+        }
+    }
+
+    pub(crate) const fn word(self) -> &'static str {
         Self::CONTENTS.words[self as usize].0
     }
 
@@ -97,18 +153,23 @@ impl FaultKind {
         const CELLS: (&str, &str) = ("cells", "cells = [[3, 4]]");
         match self {
             Self::Dead | Self::Nan => &[CELLS],
+            Self::Swapped => &[("cells", "cells = [[3, 4], [10, 4]]")],
             Self::Stuck | Self::Spike => &[CELLS, ("reading", "reading = 4095")],
             Self::Garbage => &[("reading", "reading = 4095")],
             Self::Gain => &[("factor", "factor = 0.8")],
+            Self::Stiff => &[("factor", "factor = 10.0")],
             Self::Drift => &[("reading_per_s", "reading_per_s = 1.0")],
-            Self::Late => &[("delay_ms", "delay_ms = 8.0")],
-            Self::Repeat | Self::Missing => &[],
+            Self::Late | Self::Jitter | Self::Lag => &[("delay_ms", "delay_ms = 8.0")],
+            Self::JointStop => &[("joints", "joints = [\"NAME\"] with the name of a joint")],
+            Self::Push => &[("push_n", "push_n = [0.0, 0.0, 5.0]")],
+            Self::Moving => &[("velocity_m_per_s", "velocity_m_per_s = [0.0, 0.0, -0.02]")],
+            Self::Repeat | Self::Missing | Self::Lost | Self::Gone => &[],
         }
     }
 
-    /// Whether it hits some frames, and not all.
-    const fn is_of_frames(self) -> bool {
-        matches!(self, Self::Nan | Self::Spike | Self::Garbage | Self::Repeat | Self::Missing)
+    /// Whether it hits some frames or commands, and not all.
+    pub(super) const fn is_of_frames(self) -> bool {
+        matches!(self, Self::Nan | Self::Spike | Self::Garbage | Self::Repeat | Self::Missing | Self::Lost)
     }
 
     /// Returns the keys of [`KEYS`] that the fault takes.
@@ -170,8 +231,18 @@ impl InjectBlock {
         if let Some(key) = foreign {
             let message = format!("the fault `{word}` has no `{key}`");
             let known: Vec<&str> = fault.takes().collect();
-            let help = format!("remove it; besides `role`, `fault`, `from_s` and `to_s` it has {}", quoted(known));
+            let all = ["role", "fault", "from_s", "to_s"].into_iter().chain(known);
+            let help = format!("remove it; the fault has {}", quoted(all));
             return Some(Diagnostic::new(Code::UnknownKey, self.key(key)?, message).help(help));
+        }
+        let is_alone = match table.cells.as_ref().map(|cells| &cells.value) {
+            Some(Cells::Count(count)) => *count < 2,
+            Some(Cells::List(list)) => list.len() < 2,
+            None => false,
+        };
+        if fault == FaultKind::Swapped && is_alone {
+            let message = "one cell has no other one to exchange its readings with";
+            return Some(Diagnostic::new(Code::BadValue, self.key("cells")?, message).help("write two cells or more"));
         }
         if table.rate.is_some() && table.frames.is_some() {
             let message = "a fault has either `rate` or `frames`";

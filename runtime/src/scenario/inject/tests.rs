@@ -1,10 +1,13 @@
 //! Each fault on the frames of a device whose values are known.
 
+use super::commands::SpoiltCommand;
 use super::device::Spoilt;
-use super::resolve::Injection;
+use super::fault::Fault;
+use super::resolve::{Injection, Target};
 use super::table::{InjectBlock, blocks};
-use crate::device::{Commands, Description, DeviceError, Output, Samples, Stepped};
+use crate::device::{Commands, Description, DeviceError, Disturbance, Output, Samples, Stepped};
 use crate::node::Reader;
+use crate::random::Random;
 use crate::signal::{Image, ImageShape, Unit};
 use crate::source::{SourceMap, parse_table};
 
@@ -48,7 +51,7 @@ fn run(text: &str, seed: u64) -> (Vec<Arrived>, u64) {
     assert_eq!(mistakes, [""; 0], "{text}");
     let injection = |block: InjectBlock| {
         let table = block.table.expect("no mistake");
-        Injection { device: 0, port: 0, shape: SHAPE, table }
+        Injection { device: 0, target: Target::Image(0, SHAPE), table }
     };
     let injections: Vec<Injection> = blocks.into_iter().map(injection).collect();
     let numbered: Vec<(usize, &Injection)> = injections.iter().enumerate().collect();
@@ -148,6 +151,83 @@ fn delayed_frames_arrive_late_with_their_own_stamps_and_never_go_back() {
 }
 
 #[test]
+fn jitter_delays_each_frame_by_its_own_time_and_none_goes_back() {
+    let (arrived, hits) = run(&entry("fault = \"jitter\"\ndelay_ms = 5.0"), 1);
+    assert_eq!(hits, FRAMES);
+    let delays: Vec<u64> = arrived.iter().map(|(tick, _, sequence, _)| tick + 1 - sequence).collect();
+    // A time between 0 and 5 ms ends in one of the next five ticks.
+    assert!((1..=5).all(|delay| delays.contains(&delay)) && delays.iter().all(|delay| (1..=5).contains(delay)));
+    assert!(arrived.windows(2).all(|pair| pair[0].2 < pair[1].2));
+    assert!(arrived.iter().all(|(_, stamp, sequence, _)| *stamp == (*sequence as i64 - 1) * 1_000_000));
+}
+
+#[test]
+fn swapped_cells_read_what_the_next_one_reads() {
+    let (arrived, _) = run(&entry("fault = \"swapped\"\ncells = [[0, 1], [1, 0], [1, 2]]"), 1);
+    for (frame, .., values) in arrived {
+        let good = good(frame);
+        assert_eq!(values, [good[0], good[3], good[2], good[5], good[4], good[1]]);
+    }
+}
+
+/// Sends 1, 2, 3, … to both joints of a device each millisecond, with a fault. Returns what arrives at each.
+fn sent(rest: &str) -> Vec<[f64; 2]> {
+    let (blocks, mistakes) = entries(&entry(rest));
+    assert_eq!(mistakes, [""; 0]);
+    let table = blocks[0].table.as_ref().expect("no mistake");
+    let mut command = SpoiltCommand::new(0);
+    command.faults.push(Fault::new(table, vec![1], Random::new(1, 0)));
+    let mut values = [0.0; 2];
+    let each = |tick: i64| {
+        command.deliver(tick * 1_000_000, &[tick as f64 + 1.0; 2], &mut values);
+        values
+    };
+    (0..10).map(each).collect()
+}
+
+#[test]
+fn commands_are_lost_late_or_stopped() {
+    let both = |values: [i32; 10]| values.map(|value| [f64::from(value); 2]);
+    assert_eq!(sent("fault = \"lost\"\nframes = 3\nfrom_s = 0.002"), both([1, 2, 2, 2, 2, 6, 7, 8, 9, 10]));
+    assert_eq!(sent("fault = \"lag\"\ndelay_ms = 3"), both([0, 0, 0, 1, 2, 3, 4, 5, 6, 7]));
+    // What is on its way when the lag ends is overtaken.
+    let ends = "fault = \"lag\"\ndelay_ms = 3\nto_s = 0.006";
+    assert_eq!(sent(ends), both([0, 0, 0, 1, 2, 3, 7, 8, 9, 10]));
+    let stops = sent("fault = \"joint_stop\"\njoints = [\"b\"]\nfrom_s = 0.002\nto_s = 0.004");
+    assert_eq!(
+        stops,
+        [1, 2, 3, 4, 5, 6, 7, 8, 9, 10]
+            .map(|tick| [f64::from(tick), if tick == 3 || tick == 4 { 0.0 } else { f64::from(tick) }])
+    );
+}
+
+#[test]
+fn the_world_is_disturbed_while_the_fault_is_there() {
+    let text = [
+        "fault = \"push\"\npush_n = [1, 2, 3]\nfrom_s = 0.1",
+        "fault = \"push\"\npush_n = [0, 0, 4]\nfrom_s = 0.2",
+        "fault = \"moving\"\nvelocity_m_per_s = [0, 0, 0.5]\nto_s = 0.2",
+        "fault = \"stiff\"\nfactor = 3\nfrom_s = 0.1\nto_s = 0.2",
+        "fault = \"gone\"\nfrom_s = 0.2",
+    ];
+    let (blocks, mistakes) = entries(&text.map(entry).concat());
+    assert_eq!(mistakes, [""; 0]);
+    let tables = blocks.iter().filter_map(|block| block.table.as_ref());
+    let faults: Vec<Fault> = tables.map(|table| Fault::new(table, vec![], Random::new(1, 0))).collect();
+    let at = |now: i64| {
+        let mut world = Disturbance::default();
+        faults.iter().for_each(|fault| fault.disturb(now, &mut world));
+        world
+    };
+    let velocity = [0.0, 0.0, 0.5];
+    assert_eq!(at(0), Disturbance { velocity, ..Disturbance::default() });
+    let push = [1.0, 2.0, 3.0];
+    assert_eq!(at(100_000_000), Disturbance { push, velocity, stiffness: 3.0, is_gone: false });
+    let push = [1.0, 2.0, 7.0];
+    assert_eq!(at(200_000_000), Disturbance { push, is_gone: true, ..Disturbance::default() });
+}
+
+#[test]
 fn two_faults_of_a_role_add_up() {
     let dead = entry("fault = \"dead\"\ncells = 2");
     let text = format!("{dead}{}", entry("fault = \"stuck\"\ncells = 1\nreading = 1"));
@@ -167,6 +247,10 @@ fn each_mistake_in_the_keys_of_a_fault_is_reported_once() {
         ("fault = \"repeat\"", "the fault `repeat` needs `rate` or `frames`"),
         ("fault = \"repeat\"\nrate = 0.1\nframes = 1", "a fault has either `rate` or `frames`"),
         ("fault = \"missing\"\nrate = 0.1\ncells = 1", "the fault `missing` has no `cells`"),
+        ("fault = \"swapped\"\ncells = 1", "one cell has no other one to exchange its readings with"),
+        ("fault = \"joint_stop\"", "the fault `joint_stop` needs `joints`"),
+        ("fault = \"lost\"", "the fault `lost` needs `rate` or `frames`"),
+        ("fault = \"gone\"\nfactor = 2", "the fault `gone` has no `factor`"),
         ("fault = \"dead\"\ncells = 1\nfrom_s = 2\nto_s = 1", "the fault ends at 1 s, before it begins at 2 s"),
         ("fault = \"dead\"\ncells = 1\nfrom_s = 9", "the run ends after 5 s, before the fault begins at 9 s"),
     ];

@@ -1,0 +1,40 @@
+//! From the command of an arm back to the twist that its task wants.
+
+use serde::Serialize;
+
+use super::settings::{Nodes, source, toml};
+
+/// A node between the twist of a task and the command.
+#[derive(Debug, Serialize)]
+pub(super) struct Limiter {
+    pub(super) node: String,
+    #[serde(rename = "type")]
+    pub(super) kind: String,
+    /// Its parameters as they are written, without those that are not set.
+    pub(super) values: Vec<(String, String)>,
+}
+
+/// Types that make the twist of a task, where the way back ends.
+const MAKERS: [&str; 4] = ["twist_adder", "projector", "inverse_jacobian", "twist_source"];
+
+/// Returns the limiters before a port, the first one first, and the port of the twist before all of them.
+pub(super) fn chain(nodes: &Nodes<'_>, port: &str) -> Result<(Vec<Limiter>, String), String> {
+    let (mut limits, mut port) = (Vec::new(), port.to_owned());
+    let writer = |port: &str| nodes.writer(port).ok_or_else(|| format!("no node writes `{port}`"));
+    let mut node = writer(&port)?;
+    while !MAKERS.contains(&node.kind.text.as_str()) {
+        let Some(input) = ["velocity", "twist"].into_iter().find_map(|input| source(node, input)) else { break };
+        limits.push(Limiter {
+            node: node.name.clone(),
+            kind: node.kind.text.clone(),
+            values: nodes.values(node).map(|(path, setting)| (path.to_owned(), toml(setting))).collect(),
+        });
+        input.clone_into(&mut port);
+        match nodes.writer(&port) {
+            Some(next) => node = next,
+            None => break,
+        }
+    }
+    limits.reverse();
+    Ok((limits, port))
+}

@@ -1,0 +1,121 @@
+//! `tactflow explain`: what moves the arm in each mode, in numbers.
+
+mod chain;
+mod law;
+mod page;
+mod settings;
+
+use std::path::PathBuf;
+
+use serde::Serialize;
+use tactflow_runtime::cli::clap::{self, ValueEnum};
+use tactflow_runtime::cli::{GraphArgs, Shell};
+use tactflow_runtime::graph::{Outline, compile};
+
+use chain::{Limiter, chain};
+use law::{Law, law};
+use settings::{Ends, Nodes};
+
+/// Print what moves the arm in each mode: gains, limits and delays
+#[derive(clap::Parser)]
+#[command(
+    name = "explain",
+    after_help = "It multiplies gains, columns and projectors, so each number of a table is the speed of a twist component for one unit of
+an error. It runs nothing.
+
+Examples:
+  tactflow explain graphs/hybrid.toml
+  tactflow explain graphs/rolling.toml --set nodes.pid.gains.x.kp=3
+  tactflow explain graphs/hybrid.toml move.bumpless.twist      what this port carries
+  tactflow explain graphs/edge.toml --format markdown > edge.md
+
+Exit codes: 0 success; 2 the graph does not load, or has no such port."
+)]
+pub(super) struct ExplainArgs {
+    /// The graph file
+    graph: PathBuf,
+    /// A port that carries a twist or joint velocities; all commands of arms if not given
+    port: Option<String>,
+    #[command(flatten)]
+    graph_args: GraphArgs,
+    /// Output format
+    #[arg(long, value_enum, default_value_t = Format::Text, value_name = "FORMAT")]
+    format: Format,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum Format {
+    /// For a terminal.
+    Text,
+    /// For a page.
+    Markdown,
+    /// For a program.
+    Json,
+}
+
+/// The control law of a graph.
+#[derive(Debug, Serialize)]
+struct Explained {
+    /// Nominal time between two ticks [s].
+    period_s: f64,
+    motions: Vec<Motion>,
+}
+
+/// What moves one arm, or what one port carries.
+#[derive(Debug, Serialize)]
+struct Motion {
+    /// The command, `arm.velocity`, or the port.
+    of: String,
+    /// The limiters and conversions from the task's twist to the command, in this order.
+    limits: Vec<Limiter>,
+    modes: Vec<ModeLaw>,
+}
+
+/// What moves an arm in one mode.
+#[derive(Debug, Serialize)]
+struct ModeLaw {
+    /// Name of the mode; `None` in a graph without modes.
+    mode: Option<String>,
+    #[serde(flatten)]
+    law: Law,
+    /// How the mode ends.
+    ends: Ends,
+}
+
+pub(super) fn run(args: ExplainArgs, shell: &Shell) -> Result<u8, u8> {
+    let request = args.graph_args.request(args.graph.clone());
+    let compiled = compile(shell.catalogue(), &request).map_err(|report| shell.reject(&report))?;
+    let explained = explain(compiled.outline(), args.port.as_deref()).map_err(|message| shell.refuse(message))?;
+    match args.format {
+        Format::Json => shell.say_json(&explained),
+        Format::Text => shell.say(page::text(&args.graph, &explained).trim_end()),
+        Format::Markdown => shell.say(page::markdown(&args.graph, &explained).trim_end()),
+    }
+    Ok(0)
+}
+
+fn explain(outline: &Outline, port: Option<&str>) -> Result<Explained, String> {
+    let motions: Vec<(String, &str)> = match port {
+        Some(port) => vec![(port.to_owned(), port)],
+        None => settings::commands(outline).collect(),
+    };
+    if motions.is_empty() {
+        return Err("no role is an arm, so nothing moves: name a port that carries a twist".into());
+    }
+    let motions = motions.into_iter().map(|(of, port)| motion(outline, of, port));
+    Ok(Explained { period_s: outline.period_s, motions: motions.collect::<Result<_, _>>()? })
+}
+
+fn motion(outline: &Outline, of: String, port: &str) -> Result<Motion, String> {
+    let (limits, twist) = chain(&Nodes::new(outline, None), port)?;
+    let task = settings::task_of(outline, port);
+    let modes = settings::modes(outline, task).map(|mode| {
+        let nodes = Nodes::new(outline, mode);
+        ModeLaw {
+            mode: mode.map(|mode| mode.name.clone()),
+            law: law(&nodes, &twist),
+            ends: mode.map(settings::ends).unwrap_or_default(),
+        }
+    });
+    Ok(Motion { of, limits, modes: modes.collect() })
+}

@@ -1,0 +1,110 @@
+//! `explain`: its numbers are those of a run.
+
+use std::collections::BTreeMap;
+use std::fs;
+
+use serde_json::Value;
+
+use crate::cli::in_new_folder;
+use crate::tool::say;
+
+/// The rows of a recording, each by the names of its columns; absent values are left out.
+fn recorded(graph: &str, for_s: &str) -> Vec<BTreeMap<String, f64>> {
+    let (_folder, path) = in_new_folder("run.csv");
+    let run = say(&["run", graph, "--quiet", "--for", for_s, "--out", &path]);
+    assert_eq!(run.code, 0, "{}", run.err);
+    let text = fs::read_to_string(path).unwrap();
+    let mut lines = text.lines().filter(|line| !line.starts_with('#'));
+    let names: Vec<&str> = lines.next().unwrap().split(',').collect();
+    let row = |line: &str| {
+        let cells = names.iter().zip(line.split(','));
+        cells.filter_map(|(name, cell)| Some(((*name).to_owned(), cell.parse().ok()?))).collect()
+    };
+    lines.map(row).collect()
+}
+
+fn explained(args: &[&str]) -> Value {
+    let said = say(&[&["explain"], args, &["--format", "json"]].concat());
+    assert_eq!(said.code, 0, "{}", said.err);
+    serde_json::from_str(&said.out).unwrap()
+}
+
+/// Asserts that the twist of each tick is the sum of the columns times the controls and of the constants, and that a
+/// control without integral and derivative is kp times its error.
+fn assert_is_the_law_of_a_run(graph: &str, sum: &str, for_s: &str) {
+    let explained = explained(&[graph]);
+    let modes = explained["motions"][0]["modes"].as_array().unwrap();
+    let mut compared = 0;
+    for row in recorded(graph, for_s) {
+        let mode = &modes[row["mode"] as usize];
+        let mut twist = [0.0; 6];
+        for feature in mode["features"].as_array().unwrap() {
+            let name = feature["name"].as_str().unwrap();
+            let Some(control) = row.get(&format!("pid.control.{name}")) else { continue };
+            if let (Some(0.0), Some(0.0), Some(error)) =
+                (feature["ki"].as_f64(), feature["kd"].as_f64(), row.get(&format!("error.error.{name}")))
+            {
+                let by_hand = feature["kp"].as_f64().unwrap() * error;
+                assert!((control - by_hand).abs() < 1e-9, "{graph}, {name}: {control} and {by_hand}");
+            }
+            (0..6).for_each(|i| twist[i] += feature["column"][i].as_f64().unwrap() * control);
+        }
+        for constant in mode["constants"].as_array().unwrap() {
+            (0..6).for_each(|i| twist[i] += constant["twist"][i].as_f64().unwrap());
+        }
+        for (i, part) in ["vx", "vy", "vz", "wx", "wy", "wz"].into_iter().enumerate() {
+            let Some(ran) = row.get(&format!("{sum}.twist.{part}")) else { continue };
+            assert!((ran - twist[i]).abs() < 1e-9, "{graph}, {part}: {ran} and {}", twist[i]);
+            compared += 1;
+        }
+    }
+    assert!(compared > 1000, "{graph}: {compared} values");
+}
+
+#[test]
+fn the_law_is_that_of_a_run() {
+    for graph in ["graphs/hybrid.toml", "graphs/rolling.toml", "graphs/force.toml", "graphs/position.toml"] {
+        assert_is_the_law_of_a_run(graph, "sum", "3s");
+    }
+}
+
+#[test]
+fn what_a_mode_sets_counts() {
+    let explained = explained(&["graphs/hybrid.toml", "--set", "nodes.pid.gains.x.kp=3"]);
+    let [approach, servo] = ["approach", "servo"].map(|name| {
+        let modes = explained["motions"][0]["modes"].as_array().unwrap();
+        modes.iter().find(|mode| mode["mode"] == name).unwrap().clone()
+    });
+    assert_eq!(approach["features"][0]["column"], serde_json::json!([0.0, 0.0, 0.0, 0.0, 0.0, 0.0]));
+    assert_eq!(approach["constants"][0]["twist"][2], 0.015);
+    assert_eq!((&servo["features"][0]["kp"], servo["constants"].as_array().unwrap().len()), (&3.0.into(), 0));
+    let pressure = servo["features"].as_array().unwrap().iter().find(|one| one["name"] == "pressure").unwrap();
+    // A low-pass of 100 ms, and half of nine periods of 4 ms.
+    let delay: f64 = pressure["filters"].as_array().unwrap().iter().map(|one| one["delay_s"].as_f64().unwrap()).sum();
+    assert!((delay - 0.118).abs() < 1e-9, "{delay}");
+    assert_eq!(servo["ends"][0][0], "on_lost");
+}
+
+#[test]
+fn every_shipped_task_is_explained_for_a_person_and_for_a_page() {
+    for graph in tactflow_tests::shipped_graphs() {
+        let graph = graph.display().to_string();
+        let shown = say(&["explain", &graph]);
+        let moves = say(&["show", &graph]).out.contains("velocity = ");
+        assert_eq!(shown.code, if moves { 0 } else { 2 }, "{graph}: {}", shown.err);
+        assert_eq!(say(&["explain", &graph, "--format", "markdown"]).code, shown.code, "{graph}");
+    }
+    let page = say(&["explain", "graphs/hybrid.toml"]).out;
+    for text in ["in the mode `servo`", "-3.5", "At rest: wz.", "`move.contact` (`contact_limit`)", "force_n = 15.0"] {
+        assert!(page.contains(text), "{text}: {page}");
+    }
+}
+
+#[test]
+fn one_port_is_explained_and_an_unknown_one_is_named() {
+    let port = explained(&["graphs/hybrid.toml", "move.bumpless.twist"]);
+    assert_eq!(port["motions"][0]["limits"].as_array().unwrap().len(), 1);
+    let unknown = say(&["explain", "graphs/hybrid.toml", "move.bumples.twist"]);
+    assert_eq!(unknown.code, 2);
+    assert!(unknown.err.contains("no node writes `move.bumples.twist`"), "{}", unknown.err);
+}
