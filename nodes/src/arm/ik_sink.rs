@@ -143,7 +143,7 @@ pub struct State {
 }
 
 /// How the joints share a motion that exceeds a limit or is near a singularity.
-#[derive(Debug, Clone, Default)]
+#[derive(State)]
 struct Sharing {
     elbow: Elbow,
     least_lost: LeastLost,

@@ -4,6 +4,7 @@
 //! it can still brake. A motion that leaves an interval is first given another motion of the elbow, which leaves the
 //! sensor where it is. Only what the elbow cannot give slows the task down, as a whole.
 
+use tactflow_runtime::node::State;
 use tactflow_runtime::signal::Joint;
 
 use super::null_space::{self, Row};
@@ -46,7 +47,7 @@ pub fn add_within(joints: &[Joint], q: &[f64], delay: f64, velocity: &mut [f64],
 }
 
 /// Working memory for the joints of an arm.
-#[derive(Debug, Clone, Default)]
+#[derive(Debug, State)]
 pub struct Elbow {
     /// Working memory of the null space.
     pub rows: Vec<Row>,

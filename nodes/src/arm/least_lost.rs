@@ -8,6 +8,8 @@
 //! It is solved by a primal active-set method (Nocedal and Wright, *Numerical Optimization*, algorithm 16.3) from v = 0,
 //! which every constraint allows. All iterates are within the constraints, so a search that is cut off is too.
 
+use tactflow_runtime::node::State;
+
 use super::damped::PUSH;
 use super::joint_limits::Interval;
 
@@ -28,7 +30,7 @@ enum Held {
 }
 
 /// Working memory for the joints of an arm. With n joints, constraint n is the one of the push.
-#[derive(Debug, Clone, Default)]
+#[derive(Debug, State)]
 pub struct LeastLost {
     /// J^T J + eps², by rows.
     hessian: Vec<f64>,

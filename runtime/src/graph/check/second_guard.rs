@@ -76,8 +76,9 @@ impl Second<'_> {
     fn roles_of(&self, part: &toml::Table, scope: usize) -> Vec<String> {
         let net = self.net;
         let (given, sensor) = (&net.flat.scopes[scope].roles, net.name(Producer::Role(self.sensor)));
-        let mut names: Vec<&str> =
-            nodes(part).flat_map(facts).filter_map(|fact| Some(fact.split_once('.')?.0)).collect();
+        // The name of a role that a node is only for joins by itself.
+        let always = nodes(part).filter(|node| node.get("only_with").is_none());
+        let mut names: Vec<&str> = always.flat_map(facts).filter_map(|fact| Some(fact.split_once('.')?.0)).collect();
         names.sort_unstable();
         names.dedup();
         let first = net.name(Producer::Role(self.first));

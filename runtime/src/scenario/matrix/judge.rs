@@ -207,7 +207,7 @@ mod tests {
 
     use super::*;
     use crate::scenario::matrix::attack::Reading;
-    use crate::scenario::matrix::table::ROWS;
+    use crate::scenario::matrix::table::TABLE;
 
     const PERIOD: f64 = 0.004;
 
@@ -239,7 +239,7 @@ mod tests {
     }
 
     fn broken(fault: &str, phase: Phase, run: &Run) -> Vec<String> {
-        let row = ROWS.iter().find(|row| row.name == fault).expect("the table has it");
+        let row = TABLE.rows.iter().find(|row| row.name == fault).expect("the table has it");
         let reference = self::run(|_| 4.0, |_| 0.0);
         let strike = Strike { row, severity: row.severities[0], phase, at: 2.0 };
         judge(&scene(), strike, [&reference, run], String::new()).broken

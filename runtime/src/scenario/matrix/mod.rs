@@ -23,7 +23,7 @@ use attack::{Course, Run, run};
 use judge::{Strike, judge};
 use phases::{missing, phases};
 use scene::Scene;
-use table::{ROWS, Row};
+use table::{Row, TABLE};
 
 pub use judge::Attack;
 pub use table::{Fate, Phase, described};
@@ -135,7 +135,8 @@ impl Matrix {
     /// # Errors
     /// If there is no fault or no phase with a name.
     pub fn cells(&self, faults: &[String], phases: &[String]) -> Result<Vec<(usize, Phase)>, String> {
-        let (rows, known) = (ROWS.iter().map(|row| row.name.as_str()), Phase::ALL.iter().map(|phase| phase.name()));
+        let (rows, known) =
+            (TABLE.rows.iter().map(|row| row.name.as_str()), Phase::ALL.iter().map(|phase| phase.name()));
         let rows = wanted("fault", faults, &rows.collect::<Vec<_>>())?;
         let phases = wanted("phase", phases, &known.collect::<Vec<_>>())?;
         let here = phases.into_iter().filter(|phase| self.phases[*phase].is_some());
@@ -152,7 +153,7 @@ impl Matrix {
         (number, phase): (usize, Phase),
         is_interrupted: &dyn Fn() -> bool,
     ) -> Option<Cell> {
-        let row = &ROWS[number];
+        let row = &TABLE.rows[number];
         let (at_s, expected) = (self.phases[phase as usize], row.expected(phase));
         let (fault, unit) = (row.name.clone(), row.unit.clone());
         let mut cell = Cell { fault, phase, at_s, expected, unit, attacks: Vec::new(), not_run: None };

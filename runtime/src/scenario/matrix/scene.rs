@@ -2,9 +2,11 @@
 //! commands with their limits.
 
 use crate::catalogue::Catalogue;
-use crate::graph::{Compiled, PlannedCommand, PlannedPort, PlannedRole};
+use crate::graph::{Compiled, OutlinedBlock, PlannedCommand, PlannedPort, PlannedRole};
 use crate::signal::{Kind, Shape, Unit};
 use crate::source::Item;
+
+use super::table::TABLE;
 
 /// A task on a bench, as the matrix sees it.
 #[derive(Debug, Clone)]
@@ -62,15 +64,22 @@ impl Side {
     fn of(role: &PlannedRole, compiled: &Compiled, catalogue: &Catalogue) -> Option<Self> {
         let image = role.ports.iter().find(|port| port.shape.kind() == Kind::Image && !role.is_observed)?;
         let Shape::Image(shape) = &image.shape else { return None };
-        let nodes = || compiled.plan.nodes.iter();
         let of_pad = |kind: Kind| {
             let is_of_pad = move |port: &&PlannedPort| {
                 let frame = port.frames.first().and_then(Option::as_deref);
                 port.shape.kind() == kind && frame == Some(role.name.as_str())
             };
-            nodes().flat_map(|node| &node.ports).filter(is_of_pad)
+            compiled.plan.nodes.iter().flat_map(|node| &node.ports).filter(is_of_pad)
         };
-        let twist = of_pad(Kind::Twist).last().map(|port| port.name.clone());
+        let is_limiter = |port: &&PlannedPort| {
+            let name = port.name.rsplit_once('.').map_or("", |(node, _)| node);
+            let block = compiled.outline().nodes.iter().find(|node| node.name == name);
+            let reads = |block: &OutlinedBlock, path: &str| {
+                catalogue.limit_readers().limit_of(&block.kind.text, path).is_some()
+            };
+            block.is_some_and(|block| block.settings.iter().any(|setting| reads(block, &setting.path)))
+        };
+        let twist = of_pad(Kind::Twist).filter(is_limiter).last().map(|port| port.name.clone());
         // The limiters stand in the part of the last motion in the frame of the pad.
         let part = twist.as_deref().and_then(|name| name.rsplitn(3, '.').nth(2)).unwrap_or_default();
         let limit = |name: &str| {
@@ -102,8 +111,8 @@ fn number(item: &Item) -> Option<f64> {
     }
 }
 
-/// Returns the port of the true force on a pad: `force` of its device, or `SIDE_force` if the device has several pads and
-/// the name of the role begins with the side.
+/// Returns the port of the true force on a pad: with that name alone, or with the side before it if the device has several
+/// pads and the name of the role begins with the side.
 fn true_force(role: &PlannedRole, compiled: &Compiled) -> Option<String> {
     let observed = compiled.plan.roles.iter().filter(|truth| truth.is_observed && truth.device == role.device);
     let forces = observed.flat_map(|truth| &truth.ports).filter(|port| match &port.shape {
@@ -112,7 +121,7 @@ fn true_force(role: &PlannedRole, compiled: &Compiled) -> Option<String> {
     });
     let is_its = |port: &&PlannedPort| {
         let name = port.name.rsplit('.').next().unwrap_or_default();
-        match name.strip_suffix("force") {
+        match name.strip_suffix(&*TABLE.true_force) {
             Some("") => true,
             Some(side) => role.name.starts_with(side),
             None => false,

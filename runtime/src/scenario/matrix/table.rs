@@ -99,16 +99,17 @@ pub(super) struct Row {
     why: String,
 }
 
+/// The table.
 #[derive(Deserialize)]
-struct Table {
-    row: Vec<Row>,
+pub(super) struct Table {
+    /// The name of the port of the true force on a pad.
+    pub(super) true_force: String,
+    #[serde(rename = "row")]
+    pub(super) rows: Vec<Row>,
 }
 
-/// The rows.
-pub(super) static ROWS: LazyLock<Vec<Row>> = LazyLock::new(|| {
-    let table: Table = toml::from_str(include_str!("table.toml")).expect("a test reads the same file");
-    table.row
-});
+pub(super) static TABLE: LazyLock<Table> =
+    LazyLock::new(|| toml::from_str(include_str!("table.toml")).expect("a test reads the same file"));
 
 /// What the moving mass of an arm adds to the force of a touch after the command has stopped [N]: the largest speed at
 /// which the contact limit lets a stiff arm touch, 12.6 mm/s, times [`HIT_N_S_PER_M`].
@@ -201,7 +202,7 @@ fn chosen(joints: &[String], count: usize) -> Vec<&str> {
 /// contact, the bound of the force, and why.
 #[must_use]
 pub fn described() -> Vec<[String; 6]> {
-    ROWS.iter().map(Row::described).collect()
+    TABLE.rows.iter().map(Row::described).collect()
 }
 
 #[cfg(test)]
@@ -210,10 +211,10 @@ mod tests {
 
     #[test]
     fn severities_grow_away_from_no_fault_and_each_row_has_another_name() {
-        for (i, row) in ROWS.iter().enumerate() {
+        for (i, row) in TABLE.rows.iter().enumerate() {
             let steps: Vec<f64> = row.severities.windows(2).map(|pair| pair[1] - pair[0]).collect();
             assert!(steps.iter().all(|step| step * steps[0] > 0.0), "{}", row.name);
-            assert!(ROWS[..i].iter().all(|other| other.name != row.name), "{}", row.name);
+            assert!(TABLE.rows[..i].iter().all(|other| other.name != row.name), "{}", row.name);
         }
     }
 
