@@ -72,7 +72,9 @@ pub(super) fn judge(scene: &Scene, strike: Strike<'_>, [reference, run]: [&Run; 
             broken.push(format!("the force on `{}` is {:.1} N, more than {bound:.1} N", side.pad, forces(i)));
         }
         broken.extend(motion(side, i, before, after));
-        broken.extend(push_after_loss(side, i, &run.moments, [at, SEEN_S + row.delay(severity)]));
+        // The last tick with a contact may be the one before the fault.
+        let from = at - 1.5 * scene.period;
+        broken.extend(push_after_loss(side, i, &run.moments, [from, SEEN_S + row.delay(severity)]));
     }
     broken.extend(jerks(scene, before, after));
     let halt = halt.map(|(time, _)| *time).filter(|_| run.fault.is_none());
