@@ -31,8 +31,9 @@ pub struct Attack {
 
 /// What a compliant arm gives way under a force at its ceiling [m]: 15 N at 3 kN/m.
 const GIVE_M: f64 = 0.005;
-/// How long a contact must have lasted before its end is a loss, and how long a loss takes to be seen [s].
-const HELD_S: f64 = 1.0;
+/// How long a contact must have lasted before its end is a loss, and how long a loss takes to be seen [s]. A pad may
+/// bounce for 1 s, which counts from when it has seen the contact for 40 ms.
+const HELD_S: f64 = 1.1;
 const SEEN_S: f64 = 0.1;
 /// How long an arm rests after a loss at least, and how fast it then searches at most [s, m/s].
 const WAIT_S: f64 = 0.45;
