@@ -31,8 +31,9 @@ pub struct Attack {
 
 /// What a compliant arm gives way under a force at its ceiling [m]: 15 N at 3 kN/m.
 const GIVE_M: f64 = 0.005;
-/// How long a contact must have lasted before its end is a loss, and how long a loss takes to be seen [s].
-const HELD_S: f64 = 1.0;
+/// How long a contact must have lasted before its end is a loss, and how long a loss takes to be seen [s]. A pad may
+/// bounce for 1 s, which counts from when it has seen the contact for 40 ms.
+const HELD_S: f64 = 1.1;
 const SEEN_S: f64 = 0.1;
 /// How long an arm rests after a loss at least, and how fast it then searches at most [s, m/s].
 const WAIT_S: f64 = 0.45;
@@ -72,7 +73,9 @@ pub(super) fn judge(scene: &Scene, strike: Strike<'_>, [reference, run]: [&Run; 
             broken.push(format!("the force on `{}` is {:.1} N, more than {bound:.1} N", side.pad, forces(i)));
         }
         broken.extend(motion(side, i, before, after));
-        broken.extend(push_after_loss(side, i, &run.moments, [at, SEEN_S + row.delay(severity)]));
+        // The last tick with a contact may be the one before the fault.
+        let from = at - 1.5 * scene.period;
+        broken.extend(push_after_loss(side, i, &run.moments, [from, SEEN_S + row.delay(severity)]));
     }
     broken.extend(jerks(scene, before, after));
     let halt = halt.map(|(time, _)| *time).filter(|_| run.fault.is_none());
