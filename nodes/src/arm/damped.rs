@@ -179,8 +179,9 @@ fn rotate(m: &mut Matrix, vectors: &mut Matrix, p: usize, q: usize) {
         (row[p], row[q]) = turned(row[p], row[q]);
     }
     for matrix in [m, vectors] {
-        for k in 0..6 {
-            (matrix[p][k], matrix[q][k]) = turned(matrix[p][k], matrix[q][k]);
+        let rows = matrix[p].into_iter().zip(matrix[q]);
+        for (k, (a, b)) in rows.enumerate() {
+            (matrix[p][k], matrix[q][k]) = turned(a, b);
         }
     }
 }

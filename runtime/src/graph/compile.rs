@@ -3,6 +3,7 @@
 use std::cell::RefCell;
 
 use crate::catalogue::Catalogue;
+use crate::device::RoleType;
 use crate::graph::bench::{self, OpenedBench};
 use crate::graph::build::{Builder, BuiltModes, build_modes, find_reach, max_gaps, plan_tasks};
 use crate::graph::check;
@@ -23,16 +24,20 @@ pub fn compile(catalogue: &Catalogue, request: &Request) -> Result<Compiled, Rep
     compile_in(Loader::new(catalogue.builtin_files()), catalogue, request)
 }
 
+/// Returns the roles that a bench adds to every task, each with its type.
+fn joined_roles(catalogue: &Catalogue) -> Vec<(String, String)> {
+    let joined = |role: &RoleType| Some((role.joined_as.as_ref()?.to_string(), role.name.to_string()));
+    catalogue.roles().iter().filter_map(joined).collect()
+}
+
 /// Compiles a graph with a loader that may have read other files before.
 pub(crate) fn compile_in(mut loader: Loader, catalogue: &Catalogue, request: &Request) -> Result<Compiled, Report> {
-    let joined = catalogue.roles().iter().filter_map(|role| Some((role.joined_as.as_deref()?, &*role.name)));
-    loader.joined = joined.map(|(name, kind)| (name.to_owned(), kind.to_owned())).collect();
+    loader.joined = joined_roles(catalogue);
     let mut flat = loader.load(request);
     let Loader { mut sources, mut diagnostics, mut measured, has_wrong_roles, .. } = loader;
-    let is_unreadable = diagnostics
-        .iter()
-        .any(|d| matches!(d.code, Code::Syntax | Code::Unreadable | Code::EndlessPart | Code::WrongFile));
-    if is_unreadable || has_wrong_roles {
+    let is_unreadable =
+        |code: Code| matches!(code, Code::Syntax | Code::Unreadable | Code::EndlessPart | Code::WrongFile);
+    if has_wrong_roles || diagnostics.iter().any(|found| is_unreadable(found.code)) {
         // The checks would report everything that a missing file declares, or a missing role provides, as missing.
         return Err(Report::new(sources, split(diagnostics).0));
     }

@@ -184,7 +184,7 @@ impl Node for WrenchLimit {
         let twist = countable(&inputs.twist);
         let delay = age as f64 * 1e-9 + 2.0 * self.period.max(tick.dt);
         let arm = inputs.pose.as_deref().zip(inputs.jacobian.as_deref());
-        let [speed, allowed] = self.into_load(&load, &twist, arm, delay);
+        let [speed, allowed] = self.toward_load(&load, &twist, arm, delay);
         let scale = if speed > allowed { allowed / speed } else { 1.0 };
         out.twist.set(Twist(twist.0 * scale));
         // A NaN in the wrench makes the fraction NaN, which ends the run.
@@ -223,7 +223,7 @@ impl Load {
 
 impl WrenchLimit {
     /// Returns the speed of a motion into the load, and the largest one that is allowed [m/s].
-    fn into_load(&self, load: &Load, twist: &Twist, arm: Option<(&Pose, &Jacobian)>, delay: f64) -> [f64; 2] {
+    fn toward_load(&self, load: &Load, twist: &Twist, arm: Option<(&Pose, &Jacobian)>, delay: f64) -> [f64; 2] {
         let is_touched = load.size > self.threshold;
         let gives_way = self.joints.zip(arm).filter(|_| is_touched);
         let compliance = gives_way.map_or(0.0, |(joints, arm)| joints * load.gain(arm));

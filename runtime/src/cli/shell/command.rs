@@ -87,7 +87,6 @@ impl GraphArgs {
     }
 
     /// Returns the request to load a graph with these arguments.
-    #[must_use]
     pub fn request(&self, graph: PathBuf) -> Request {
         Request { graph, bench: self.bench.clone(), set: self.set.clone(), ..Request::default() }
     }
