@@ -70,7 +70,7 @@ impl Side {
             };
             nodes().flat_map(|node| &node.ports).filter(is_of_pad)
         };
-        let twist = of_pad(Kind::Twist).last().map(|port| port.name.clone());
+        let twist = of_pad(Kind::Twist).next_back().map(|port| port.name.clone());
         // The limiters stand in the part of the last motion in the frame of the pad.
         let part = twist.as_deref().and_then(|name| name.rsplitn(3, '.').nth(2)).unwrap_or_default();
         let limit = |name: &str| {
