@@ -1,7 +1,7 @@
-//! The fault matrix: every fault of the [`table`] strikes a task in each of its phases, and grows until the outcome
+//! The fault matrix: every fault of the `table` strikes a task in each of its phases, and grows until the outcome
 //! changes.
 //!
-//! [`scene`] finds what there is to see in a task, [`attack`] runs it, [`phases`] finds when to strike, and [`judge`] judges a
+//! `scene` finds what there is to see in a task, `attack` runs it, `phases` finds when to strike, and `judge` judges a
 //! run beside the one without a fault. A fault is an entry `[[inject]]`, so a scenario can repeat it.
 
 mod attack;
