@@ -186,7 +186,7 @@ mod tests {
     fn what_cannot_be_is_refused() {
         for (bad, place) in [
             ("features = [\"force\"]", "bad-value: `\"force\"`"),
-            ("features = []", "bad-value: `[]`"),
+            ("features = []", "bad-value: `features`"),
             ("features = [\"x\"]\nmin = 1.5", "bad-value: `1.5`"),
             ("features = [\"x\"]\nmax = 0.5", "bad-value: `0.5`"),
             ("", "missing-key: `the node`"),

@@ -237,8 +237,8 @@ mod tests {
     #[test]
     fn a_box_without_tactels_is_refused() {
         let cases = [
-            ("size = [0.01, 0.01]\ncentre = [0.1, 0]", "bad-value: `[0.01, 0.01]`"),
-            ("size = [0.01, 0.003]", "bad-value: `[0.01, 0.003]`"),
+            ("size = [0.01, 0.01]\ncentre = [0.1, 0]", "bad-value: `size`"),
+            ("size = [0.01, 0.003]", "bad-value: `size`"),
             ("size = [0.01, 0]", "bad-value: `0`"),
             ("size = [0.01]", "bad-value: `[0.01]`"),
         ];

@@ -100,12 +100,12 @@ fn a_gate_begins_and_ends_the_signal() {
 #[test]
 fn what_cannot_be_is_refused() {
     for (bad, place) in [
-        ("period = 0.5003\nmin_frequency = 6.0\nmax_frequency = 40.0", "bad-value: `0.5003`"),
-        ("period = 0.0005\nmin_frequency = 6.0\nmax_frequency = 40.0", "bad-value: `0.0005`"),
-        ("period = 0.5\nmin_frequency = 6.0\nmax_frequency = 501.0", "bad-value: `501.0`"),
-        ("period = 0.5\nmin_frequency = 6.3\nmax_frequency = 7.7", "bad-value: `7.7`"),
-        ("period = 0.5\nmin_frequency = 40.0\nmax_frequency = 6.0", "bad-value: `6.0`"),
-        ("period = 9.0\nmin_frequency = 6.0\nmax_frequency = 40.0", "bad-value: `9.0`"),
+        ("period = 0.5003\nmin_frequency = 6.0\nmax_frequency = 40.0", "bad-value: `period`"),
+        ("period = 0.0005\nmin_frequency = 6.0\nmax_frequency = 40.0", "bad-value: `period`"),
+        ("period = 0.5\nmin_frequency = 6.0\nmax_frequency = 501.0", "bad-value: `max_frequency`"),
+        ("period = 0.5\nmin_frequency = 6.3\nmax_frequency = 7.7", "bad-value: `max_frequency`"),
+        ("period = 0.5\nmin_frequency = 40.0\nmax_frequency = 6.0", "bad-value: `max_frequency`"),
+        ("period = 9.0\nmin_frequency = 6.0\nmax_frequency = 40.0", "bad-value: `period`"),
         ("min_frequency = 6.0\nmax_frequency = 40.0", "missing-key: `the node`"),
         ("period = 0.5\nmin_frequency = 6.0\nmax_frequency = 40.0\nperiods = 0", "bad-value: `0`"),
     ] {

@@ -22,11 +22,11 @@ use tactflow_runtime::source::Code;
 ///
 /// Wire it between `feature_error` and `pid`. What the controller does while a feature rests depends on `inside`:
 ///
-/// - `"zero"`: the error is 0, and the integral stays. It still acts against a creep of foam, but it also moves a
-///   feature slowly through the band and out at the other side.
 /// - `"absent"`: the feature is absent. `pid` contributes nothing for it, and after the graph's `reset_after_ms` it
 ///   resets the integral of the feature: the feature stands still until its error is greater than `outer`. Do not list
-///   such a feature in a condition of a mode.
+///   such a feature in `requires` or in a condition of a mode.
+/// - `"zero"`: the error is 0, for a controller without an integral. The integral of a `pid` would stay, move the
+///   feature through the band and out at the other side, and hunt in larger steps than without the band.
 ///
 /// An absent feature stays absent. After the graph's `reset_after_ms` it no longer rests when it returns.
 ///
@@ -50,7 +50,7 @@ pub struct Params {
     #[param(live)]
     width: Map<Width>,
     /// What a feature is while it rests.
-    #[param(default = Inside::Zero)]
+    #[param(default = Inside::Absent)]
     inside: Inside,
 }
 

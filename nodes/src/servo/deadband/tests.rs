@@ -82,9 +82,9 @@ fn a_held_error_stays_and_a_long_absence_ends_the_rest() {
 #[test]
 fn wrong_widths_are_refused() {
     let cases = [
-        ("width = {}", "missing-key: `{}`"),
-        ("width.force = { inner = 1.0, outer = 3.0 }", "unknown-key: `force`"),
-        ("width.x = { inner = 3.0, outer = 3.0 }", "bad-value: `3.0`"),
+        ("width = {}", "missing-key: `width`"),
+        ("width.force = { inner = 1.0, outer = 3.0 }", "unknown-key: `width.force`"),
+        ("width.x = { inner = 3.0, outer = 3.0 }", "bad-value: `width.x.outer`"),
         ("width.x = { inner = 0.0, outer = 3.0 }", "bad-value: `0.0`"),
         ("width.x = { inner = 1.0, outer = 2.0 }\ninside = \"hold\"", "bad-value: `\"hold\"`"),
     ];
@@ -135,11 +135,11 @@ fn hunt(inside: Option<&str>) -> [f64; 2] {
 }
 
 #[test]
-fn with_friction_an_integral_hunts_and_with_a_band_it_rests() {
+fn with_friction_an_integral_hunts_and_an_absent_error_lets_it_rest() {
     let [error, way] = hunt(None);
-    assert!(error > 0.01 && way > 0.05, "it hunts: {error}, {way}");
+    assert!(error > 0.008 && way > 0.1, "it hunts: {error}, {way}");
     let [error, way] = hunt(Some("absent"));
-    assert!(error < 0.012 && way == 0.0, "it rests: {error}, {way}");
-    let [_, slow] = hunt(Some("zero"));
-    assert!(slow < 0.05, "it moves less: {slow}");
+    assert!(error < 0.005 && way == 0.0, "it rests: {error}, {way}");
+    let [error, way] = hunt(Some("zero"));
+    assert!(error > 0.012 && way > 0.1, "the integral stays, and it still hunts: {error}, {way}");
 }

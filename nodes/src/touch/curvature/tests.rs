@@ -1,5 +1,7 @@
 //! `curvature` against curves that are drawn on a pad, and against a least-squares solution by nalgebra.
 
+use std::f64::consts::PI;
+
 use nalgebra::{Matrix2, Matrix3, Vector2, Vector3};
 use proptest::prelude::*;
 use tactflow_runtime::harness::{NodeRig, places};
@@ -45,13 +47,16 @@ fn show(rig: &mut NodeRig, value: &dyn Fn(f64, f64) -> f64) -> [Option<f64>; 3] 
     ["turn", "length", "rate"].map(|output| rig.get::<Scalar>(output).copied())
 }
 
-/// The print of a line n = c s² that is `length` long, whose axis is at an angle to x: a bell across the line.
+/// The print of a line n = c s² whose axis is at an angle to x: a bell across the line and a squared cosine along it,
+/// with the standard deviation of a uniform bar of this `length`.
 fn line(c: f64, length: f64, angle: f64) -> impl Fn(f64, f64) -> f64 {
     let (sine, cosine) = libm::sincos(angle);
+    // The variance of a squared cosine up to its zeros at ±h is h² (1/3 - 2/pi²).
+    let h = length / (12.0 * (1.0 / 3.0 - 2.0 / PI.powi(2))).sqrt();
     move |x, y| {
         let (s, n) = (cosine * x + sine * y, cosine * y - sine * x);
-        let across = (n - c * s * s) / 0.004;
-        if s.abs() <= 0.5 * length { libm::exp(-0.5 * across * across) } else { 0.0 }
+        let (along, across) = (libm::cos(0.5 * PI * s / h), (n - c * s * s) / 0.004);
+        if s.abs() <= h { along * along * libm::exp(-0.5 * across * across) } else { 0.0 }
     }
 }
 
@@ -72,12 +77,12 @@ fn a_parabola_has_its_curvature_at_any_angle() {
 fn an_arc_has_the_curvature_of_its_circle() {
     for radius in [0.06, 0.1, -0.08] {
         let value = move |x: f64, y: f64| {
-            let (from_centre, is_seen) = (libm::hypot(x, y - radius), x.abs() <= 0.03);
+            let (from_centre, is_seen) = (libm::hypot(x, y - radius), x.abs() <= 0.032);
             let across = (from_centre - radius.abs()) / 0.004;
             if is_seen { libm::exp(-0.5 * across * across) } else { 0.0 }
         };
         let [turn, length, _] = show(&mut built("").unwrap(), &value).map(Option::unwrap_or_default);
-        let expected = (1.0 + 0.054 * (0.06 / radius) * (0.06 / radius)) / radius;
+        let expected = (1.0 + 0.054 * (0.064 / radius) * (0.064 / radius)) / radius;
         assert!((turn / length - expected).abs() < 0.05 / radius.abs(), "{radius}: {} of {expected}", turn / length);
     }
 }
@@ -107,7 +112,7 @@ fn what_is_no_line_is_absent() {
     let cases: [(&str, &str, Box<dyn Fn(f64, f64) -> f64>); 6] = [
         ("nothing", "", Box::new(|_, _| 0.0)),
         ("a round print", "", Box::new(|x, y| libm::exp(-0.5 * (x * x + y * y) / 6.4e-5))),
-        ("a short line", "min_length_m = 0.04", Box::new(line(0.0, 0.03, 0.0))),
+        ("a short line", "min_length_m = 0.05", Box::new(line(0.0, 0.04, 0.0))),
         ("a tight bend", "min_radius_m = 0.15", Box::new(line(5.0, 0.07, 0.0))),
         (
             "one tactel",
@@ -123,14 +128,14 @@ fn what_is_no_line_is_absent() {
     for (what, params, value) in cases {
         assert_eq!(show(&mut built(params).unwrap(), &value), [None; 3], "{what}");
     }
-    assert!(show(&mut built("min_length_m = 0.02").unwrap(), &line(0.0, 0.03, 0.0))[0].is_some());
+    assert!(show(&mut built("min_length_m = 0.03").unwrap(), &line(0.0, 0.04, 0.0))[0].is_some());
 }
 
 #[test]
 fn wrong_parameters_are_refused() {
     for (bad, place) in [
         ("threshold = 0.1", "unknown-key: `threshold`"),
-        ("weight = \"excess\"", "missing-key: `\"excess\"`"),
+        ("weight = \"excess\"", "missing-key: `weight`"),
         ("min_anisotropy = 1.5", "bad-value: `1.5`"),
         ("min_radius_m = 0", "bad-value: `0`"),
     ] {
