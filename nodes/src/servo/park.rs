@@ -21,10 +21,9 @@ use crate::usual::{USUAL_LENGTH_M, USUAL_M_PER_S};
 /// afresh. The servoing must be off meanwhile: set `select` of the `projector` to zeros in the mode that parks.
 ///
 /// ```toml
-/// [nodes.park]                        # 2 cm off the surface, when the path is done
+/// [nodes.park]                        # 2 cm off the surface, at once; or with `in.start = "scan.done"`
 /// type = "park"
 /// in.pose = "state.sensor_pose"
-/// in.start = "path.done"
 /// lift_m = 0.02
 /// ```
 #[derive(Describe)]
@@ -203,7 +202,9 @@ mod tests {
         scene.rig.set("start", true);
         assert_eq!(scene.step(), (Some(-0.02), false));
         scene.rig.set("start", false);
-        (0..1000).for_each(|_| drop(scene.step()));
+        (0..1000).for_each(|_| {
+            scene.step();
+        });
         assert!((scene.place().z + 0.02).abs() <= 0.0005);
         scene.rig.set("start", true);
         assert_eq!(scene.step(), (None, true), "once");
@@ -219,7 +220,9 @@ mod tests {
     #[test]
     fn without_a_pose_it_is_absent_and_after_long_it_begins_afresh() {
         let mut scene = Scene::new("", false);
-        (0..1000).for_each(|_| drop(scene.step()));
+        (0..1000).for_each(|_| {
+            scene.step();
+        });
         scene.rig.lose("pose");
         scene.rig.step_ms(30.0);
         assert_eq!(scene.rig.get::<Flag>("done"), None);

@@ -268,7 +268,9 @@ mod tests {
     #[test]
     fn another_object_is_found_within_the_memory() {
         let mut rig = built(NOMINAL).unwrap();
-        (0..500).for_each(|i| drop(show(&mut rig, sine(i), 10.0 * sine(i))));
+        (0..500).for_each(|i| {
+            show(&mut rig, sine(i), 10.0 * sine(i));
+        });
         let stiffer = (500..1250).map(|i| show(&mut rig, sine(i), 50.0 * sine(i))).last().unwrap();
         assert!((stiffer.0.unwrap() - 5.0).abs() < 0.05, "{stiffer:?}");
     }
@@ -276,7 +278,9 @@ mod tests {
     #[test]
     fn what_is_not_a_number_does_not_stay_and_a_long_absence_begins_afresh() {
         let mut rig = built(NOMINAL).unwrap();
-        (0..300).for_each(|i| drop(show(&mut rig, sine(i), 10.0 * sine(i))));
+        (0..300).for_each(|i| {
+            show(&mut rig, sine(i), 10.0 * sine(i));
+        });
         let (ratio, is_valid) = show(&mut rig, 0.0, f64::NAN);
         assert!(!is_valid && (ratio.unwrap() - 1.0).abs() < 1e-9);
         assert!(!show(&mut rig, f64::NAN, 0.0).1);
