@@ -145,7 +145,7 @@ fn loops(loops: &[Stability], style: &Style) -> String {
         let over = one.object.as_ref().map(|object| format!(" over `{object}`")).unwrap_or_default();
         let _ = writeln!(
             text,
-            "No margins of `{}`{over}: the bench does not say how it answers; add it to `contacts` in `[facts.ARM]`.",
+            "No margins of `{}`{over}: the bench does not say how it answers. `tactflow tune` measures it.",
             one.feature
         );
     }

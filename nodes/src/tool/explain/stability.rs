@@ -1,5 +1,7 @@
 //! The margins of the loops of one mode.
 
+use std::collections::BTreeMap;
+
 use serde::Serialize;
 
 use crate::tool::control::contacts::{Contact, contacts};
@@ -27,7 +29,7 @@ pub(super) fn stability(
 ) -> Result<Vec<Stability>, String> {
     let arm = command.split('.').next().unwrap_or_default();
     let declared = contacts(facts, arm)?;
-    let alone = [Contact { object: String::new(), latency_ms: 0.0, features: Default::default() }];
+    let alone = [Contact { object: String::new(), latency_ms: 0.0, features: BTreeMap::new() }];
     let declared = if declared.is_empty() { &alone[..] } else { &declared[..] };
     let controlled: Vec<&Feature> = law.features.iter().filter(|feature| feature.moves()).collect();
     let loops = declared.iter().flat_map(|contact| {

@@ -1,10 +1,12 @@
 //! One run with a test signal: the frequency response of a loop, measured while it is closed.
 
 use std::f64::consts::PI;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
 
 use nalgebra::Complex;
 use tactflow_runtime::catalogue::Catalogue;
-use tactflow_runtime::engine::{End, Engine, RunOptions};
+use tactflow_runtime::engine::{End, Engine, RunOptions, run};
 use tactflow_runtime::graph::{Outline, OutlinedMode, Request, compile};
 use tactflow_runtime::record::PortColumns;
 
@@ -27,7 +29,7 @@ const SIGNAL: &str = "tune_signal";
 const TWIST: &str = "tune_twist";
 
 /// The loop that an experiment opens with its signal.
-#[derive(Debug, Clone)]
+#[derive(Clone)]
 pub(super) struct Experiment<'a> {
     pub(super) catalogue: &'a Catalogue,
     pub(super) request: &'a Request,
@@ -98,7 +100,6 @@ impl Experiment<'_> {
         let request =
             Request { set: [&self.request.set[..], &self.settings(amplitude)].concat(), ..self.request.clone() };
         let compiled = compile(self.catalogue, &request).map_err(|report| report.render(false))?;
-        let options = RunOptions { duration: Some(duration()), ..RunOptions::default() };
         let mut engine = Engine::new(compiled);
         let pid = self.feature.pid.as_deref().unwrap_or_default();
         let find = |engine: &Engine, name: String| {
@@ -110,10 +111,10 @@ impl Experiment<'_> {
         let period = engine.period() as f64 * 1e-9;
         let in_period = (PERIOD_S / period).round() as usize;
         let wanted = (SETTLING + MEASURED) * in_period;
-        let cancel = std::sync::Arc::new(std::sync::atomic::AtomicBool::new(false));
-        let options = RunOptions { cancel: Some(cancel.clone()), ..options };
+        let cancel = Arc::new(AtomicBool::new(false));
+        let options = RunOptions { duration: Some(duration()), cancel: Some(cancel.clone()), ..RunOptions::default() };
         let column = self.feature.column[self.component];
-        let outcome = tactflow_runtime::engine::run(&mut engine, &options, &mut |engine| {
+        let outcome = run(&mut engine, &options, &mut |engine| {
             let Some(added) = engine.bus().scalar(signal) else {
                 if !rows.is_empty() && rows.len() < wanted {
                     left.get_or_insert_with(|| engine.mode().unwrap_or("the end").to_owned());
@@ -122,7 +123,7 @@ impl Experiment<'_> {
             };
             rows.push([engine.bus().scalar(control).unwrap_or(f64::NAN) * column, added]);
             if rows.len() >= wanted {
-                cancel.store(true, std::sync::atomic::Ordering::Relaxed);
+                cancel.store(true, Ordering::Relaxed);
             }
         });
         let outcome = outcome.map_err(|error| format!("the run cannot start: {error}"))?;

@@ -147,7 +147,7 @@ mod tests {
     use super::*;
 
     fn lines(gain: f64, resonance: Option<(f64, f64)>, latency: f64, noise: f64) -> Vec<Line> {
-        let mut random = Random::new(7);
+        let mut random = Random::new(7, 0);
         let omegas = (1..=32).map(|i| 2.0 * std::f64::consts::PI * 0.25 * f64::from(i));
         let mut line = |omega: f64| {
             let ideal = arm(omega, resonance) * turn(omega * latency) * gain;

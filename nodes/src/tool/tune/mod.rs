@@ -7,6 +7,7 @@ mod page;
 mod save;
 mod trial;
 
+use std::collections::BTreeMap;
 use std::path::PathBuf;
 
 use serde::Serialize;
@@ -168,7 +169,7 @@ fn tune(args: &TuneArgs, shell: &Shell, request: &Request, compiled: &Compiled) 
     for bench in &benches {
         let request = on_bench(request, bench.as_ref(), shell)?;
         let mut contact =
-            Contact { object: object(outline, args, bench.as_ref()), latency_ms: 0.0, features: Default::default() };
+            Contact { object: object(outline, args, bench.as_ref()), latency_ms: 0.0, features: BTreeMap::new() };
         for (feature, answers) in controlled.iter().zip(&mut answers) {
             let experiment = Experiment {
                 catalogue: shell.catalogue(),
@@ -234,7 +235,7 @@ fn controlled<'o>(
     let features: Vec<Feature> = features.into_iter().filter(is_asked).collect();
     match features.is_empty() {
         true => Err(format!("the mode `{}` controls no feature with a `pid`", mode.name)),
-        false => Ok((mode, features)),
+        false => Ok((*mode, features)),
     }
 }
 
@@ -322,7 +323,7 @@ fn agreed(experiment: &Experiment<'_>, shell: &Shell) -> Result<Result<Vec<Line>
     for doubling in 0..=DOUBLINGS {
         let amplitude = FIRST[experiment.component / 3] * f64::from(1_u32 << doubling);
         let unit = if experiment.component < 3 { "m/s" } else { "rad/s" };
-        shell.progress(format_args!("`{}`: a test signal of {amplitude} {unit}", experiment.feature.name));
+        shell.say_beside(&format!("`{}`: a test signal of {amplitude} {unit}", experiment.feature.name));
         let lines = match experiment.run(amplitude)? {
             Answered::Lines(lines) => lines,
             Answered::Nothing(reason) => {

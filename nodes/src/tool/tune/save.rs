@@ -8,7 +8,7 @@ use toml_edit::{Array, InlineTable, Value};
 
 use super::{TuneArgs, Tuned, experiment};
 use crate::tool::control::contacts::{Answer, Contact};
-use crate::tool::guided::bench_file::BenchFile;
+use crate::tool::guided::BenchFile;
 
 /// Writes all files, and returns what was written.
 ///
