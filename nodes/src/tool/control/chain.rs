@@ -6,19 +6,19 @@ use super::settings::{Nodes, source, toml};
 
 /// A node between the twist of a task and the command.
 #[derive(Debug, Serialize)]
-pub(in crate::tool) struct Limiter {
-    pub(in crate::tool) node: String,
+pub(crate) struct Limiter {
+    pub(crate) node: String,
     #[serde(rename = "type")]
-    pub(in crate::tool) kind: String,
+    pub(crate) kind: String,
     /// Its parameters as they are written, without those that are not set.
-    pub(in crate::tool) values: Vec<(String, String)>,
+    pub(crate) values: Vec<(String, String)>,
 }
 
 /// Types that make the twist of a task, where the way back ends.
 const MAKERS: [&str; 4] = ["twist_adder", "projector", "inverse_jacobian", "twist_source"];
 
 /// Returns the limiters before a port, the first one first, and the port of the twist before all of them.
-pub(in crate::tool) fn chain(nodes: &Nodes<'_>, port: &str) -> Result<(Vec<Limiter>, String), String> {
+pub(crate) fn chain(nodes: &Nodes<'_>, port: &str) -> Result<(Vec<Limiter>, String), String> {
     let (mut limits, mut port) = (Vec::new(), port.to_owned());
     let writer = |port: &str| nodes.writer(port).ok_or_else(|| format!("no node writes `{port}`"));
     let mut node = writer(&port)?;

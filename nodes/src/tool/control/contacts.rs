@@ -6,45 +6,45 @@ use serde::{Deserialize, Serialize};
 
 /// What the arm touches: one entry of `contacts` in `[facts.ARM]`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub(in crate::tool) struct Contact {
+pub(crate) struct Contact {
     /// Name of the object, for messages.
-    pub(in crate::tool) object: String,
+    pub(crate) object: String,
     /// Time from a command to the image that shows its effect, without the period of the graph and without filters
     /// [ms].
     #[serde(default)]
-    pub(in crate::tool) latency_ms: f64,
+    pub(crate) latency_ms: f64,
     /// The features, by the name of the port that measures them.
     #[serde(flatten)]
-    pub(in crate::tool) features: BTreeMap<String, Answer>,
+    pub(crate) features: BTreeMap<String, Answer>,
 }
 
 /// How one feature answers the commanded motion of the sensor.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
-pub(in crate::tool) struct Answer {
+pub(crate) struct Answer {
     /// Change of the feature for each metre along x, y and z of the sensor.
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub(in crate::tool) vx: Option<f64>,
+    pub(crate) vx: Option<f64>,
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub(in crate::tool) vy: Option<f64>,
+    pub(crate) vy: Option<f64>,
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub(in crate::tool) vz: Option<f64>,
+    pub(crate) vz: Option<f64>,
     /// Change of the feature for each radian about x, y and z of the sensor.
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub(in crate::tool) wx: Option<f64>,
+    pub(crate) wx: Option<f64>,
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub(in crate::tool) wy: Option<f64>,
+    pub(crate) wy: Option<f64>,
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub(in crate::tool) wz: Option<f64>,
+    pub(crate) wz: Option<f64>,
     /// Resonance of arm and contact along this motion [Hz]; a rigid arm has none.
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub(in crate::tool) resonance_hz: Option<f64>,
+    pub(crate) resonance_hz: Option<f64>,
     /// Damping of the resonance, as a fraction of the critical one [1].
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub(in crate::tool) damping_ratio: Option<f64>,
+    pub(crate) damping_ratio: Option<f64>,
     /// Latency of this feature, instead of that of the contact [ms].
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub(in crate::tool) latency_ms: Option<f64>,
+    pub(crate) latency_ms: Option<f64>,
 }
 
 /// Damping of a resonance that a bench states without one: that of the paper's arm [1].
@@ -53,7 +53,7 @@ const USUAL_DAMPING: f64 = 0.2;
 impl Answer {
     /// Returns what geometry alone says of a feature: a place moves against the sensor, and so does an angle about its
     /// normal. `None` if the object decides.
-    pub(in crate::tool) fn of_geometry(feature: &str) -> Option<Self> {
+    pub(crate) fn of_geometry(feature: &str) -> Option<Self> {
         match feature {
             "x" => Some(Self { vx: Some(-1.0), ..Self::default() }),
             "y" => Some(Self { vy: Some(-1.0), ..Self::default() }),
@@ -63,12 +63,12 @@ impl Answer {
     }
 
     /// Returns the change of the feature for each unit of a twist.
-    pub(in crate::tool) fn row(&self) -> [f64; 6] {
+    pub(crate) fn row(&self) -> [f64; 6] {
         [self.vx, self.vy, self.vz, self.wx, self.wy, self.wz].map(Option::unwrap_or_default)
     }
 
     /// Returns the circular frequency [rad/s] and the damping ratio of the resonance.
-    pub(in crate::tool) fn resonance(&self) -> Option<(f64, f64)> {
+    pub(crate) fn resonance(&self) -> Option<(f64, f64)> {
         let damping = self.damping_ratio.unwrap_or(USUAL_DAMPING);
         self.resonance_hz.map(|hz| (2.0 * std::f64::consts::PI * hz, damping))
     }
@@ -89,7 +89,7 @@ impl Answer {
 
 impl Contact {
     /// Returns how a feature answers: as the bench says, or else by geometry.
-    pub(in crate::tool) fn answer(&self, feature: &str) -> Option<Answer> {
+    pub(crate) fn answer(&self, feature: &str) -> Option<Answer> {
         self.features.get(feature).copied().or_else(|| Answer::of_geometry(feature))
     }
 
@@ -105,7 +105,7 @@ impl Contact {
 ///
 /// # Errors
 /// If the fact has another form.
-pub(in crate::tool) fn contacts(facts: &[(String, toml::Value)], arm: &str) -> Result<Vec<Contact>, String> {
+pub(crate) fn contacts(facts: &[(String, toml::Value)], arm: &str) -> Result<Vec<Contact>, String> {
     let name = format!("{arm}.contacts");
     let Some((_, value)) = facts.iter().find(|(fact, _)| *fact == name) else { return Ok(Vec::new()) };
     let wrong = |why: String| {

@@ -7,75 +7,75 @@ use super::settings::{Nodes, source};
 use super::shape::Shape;
 
 /// The components of a twist.
-pub(in crate::tool) const COMPONENTS: [&str; 6] = ["vx", "vy", "vz", "wx", "wy", "wz"];
+pub(crate) const COMPONENTS: [&str; 6] = ["vx", "vy", "vz", "wx", "wy", "wz"];
 
 /// What a twist is made of.
 #[derive(Debug, Default, Serialize)]
-pub(in crate::tool) struct Law {
-    pub(in crate::tool) features: Vec<Feature>,
+pub(crate) struct Law {
+    pub(crate) features: Vec<Feature>,
     /// Constant motions.
-    pub(in crate::tool) constants: Vec<Constant>,
+    pub(crate) constants: Vec<Constant>,
     /// Other nodes that move the arm, which this command does not know in numbers.
-    pub(in crate::tool) guidance: Vec<Guidance>,
+    pub(crate) guidance: Vec<Guidance>,
 }
 
 /// A feature that is controlled.
 #[derive(Debug, Serialize)]
-pub(in crate::tool) struct Feature {
-    pub(in crate::tool) name: String,
+pub(crate) struct Feature {
+    pub(crate) name: String,
     /// Speed of each component for one unit of control, after the projectors.
-    pub(in crate::tool) column: [f64; 6],
-    pub(in crate::tool) kp: f64,
-    pub(in crate::tool) ki: f64,
-    pub(in crate::tool) kd: f64,
+    pub(crate) column: [f64; 6],
+    pub(crate) kp: f64,
+    pub(crate) ki: f64,
+    pub(crate) kd: f64,
     /// The port that is measured, before its filters.
-    pub(in crate::tool) measured: Option<String>,
-    pub(in crate::tool) setpoint: Option<f64>,
+    pub(crate) measured: Option<String>,
+    pub(crate) setpoint: Option<f64>,
     /// The node that turns its control into a twist.
     #[serde(skip)]
-    pub(in crate::tool) jacobian: String,
+    pub(crate) jacobian: String,
     /// Its controller.
     #[serde(skip)]
-    pub(in crate::tool) pid: Option<String>,
+    pub(crate) pid: Option<String>,
     /// The port of its error.
     #[serde(skip)]
-    pub(in crate::tool) error: Option<String>,
+    pub(crate) error: Option<String>,
     /// Filters from the measurement to the error.
-    pub(in crate::tool) filters: Vec<Filter>,
+    pub(crate) filters: Vec<Filter>,
 }
 
 /// A filter of a feature.
 #[derive(Debug, Serialize)]
-pub(in crate::tool) struct Filter {
-    pub(in crate::tool) node: String,
+pub(crate) struct Filter {
+    pub(crate) node: String,
     #[serde(rename = "type")]
-    pub(in crate::tool) kind: String,
+    pub(crate) kind: String,
     /// Delay of a slow ramp [s].
-    pub(in crate::tool) delay_s: f64,
+    pub(crate) delay_s: f64,
     #[serde(skip)]
-    pub(in crate::tool) shape: Shape,
+    pub(crate) shape: Shape,
 }
 
 /// A constant twist, after the projectors.
 #[derive(Debug, Serialize)]
-pub(in crate::tool) struct Constant {
-    pub(in crate::tool) node: String,
-    pub(in crate::tool) twist: [f64; 6],
+pub(crate) struct Constant {
+    pub(crate) node: String,
+    pub(crate) twist: [f64; 6],
 }
 
 /// A node that moves the arm by a law of its own.
 #[derive(Debug, Serialize)]
-pub(in crate::tool) struct Guidance {
-    pub(in crate::tool) port: String,
+pub(crate) struct Guidance {
+    pub(crate) port: String,
     #[serde(rename = "type")]
-    pub(in crate::tool) kind: String,
+    pub(crate) kind: String,
     /// Components that the projectors behind it pass.
-    pub(in crate::tool) passes: [bool; 6],
+    pub(crate) passes: [bool; 6],
 }
 
 impl Law {
     /// Returns whether anything moves a component.
-    pub(in crate::tool) fn moves(&self, i: usize) -> bool {
+    pub(crate) fn moves(&self, i: usize) -> bool {
         self.features.iter().any(|feature| feature.column[i] != 0.0 && feature.has_gain())
             || self.constants.iter().any(|constant| constant.twist[i] != 0.0)
             || self.guidance.iter().any(|guidance| guidance.passes[i])
@@ -84,23 +84,23 @@ impl Law {
 
 impl Feature {
     /// Returns whether the feature has any gain.
-    pub(in crate::tool) fn has_gain(&self) -> bool {
+    pub(crate) fn has_gain(&self) -> bool {
         [self.kp, self.ki, self.kd].iter().any(|gain| *gain != 0.0)
     }
 
     /// Returns whether the feature moves anything.
-    pub(in crate::tool) fn moves(&self) -> bool {
+    pub(crate) fn moves(&self) -> bool {
         self.has_gain() && self.column.iter().any(|entry| *entry != 0.0)
     }
 
     /// Returns the delay of all filters [s].
-    pub(in crate::tool) fn delay(&self) -> f64 {
+    pub(crate) fn delay(&self) -> f64 {
         self.filters.iter().map(|filter| filter.delay_s).sum()
     }
 }
 
 /// Returns what the twist of a port is made of.
-pub(in crate::tool) fn law(nodes: &Nodes<'_>, port: &str) -> Law {
+pub(crate) fn law(nodes: &Nodes<'_>, port: &str) -> Law {
     let mut law = Law::default();
     collect(nodes, port, [true; 6], &mut law);
     law

@@ -9,23 +9,23 @@ use super::response::Loop;
 
 /// The margins of a loop.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub(in crate::tool) struct Margins {
+pub(crate) struct Margins {
     /// Whether the closed loop settles.
-    pub(in crate::tool) is_stable: bool,
+    pub(crate) is_stable: bool,
     /// Largest frequency at which the gain around the loop is 1 [Hz].
-    pub(in crate::tool) crossover_hz: Option<f64>,
+    pub(crate) crossover_hz: Option<f64>,
     /// Smallest lag that would make the loop unstable, over all frequencies where its gain is 1 [deg].
-    pub(in crate::tool) phase_deg: Option<f64>,
+    pub(crate) phase_deg: Option<f64>,
     /// Smallest factor on the gain that would make the loop unstable [dB]; negative if it is.
-    pub(in crate::tool) gain_db: Option<f64>,
+    pub(crate) gain_db: Option<f64>,
     /// Largest factor by which the loop amplifies a disturbance: the maximum of |1 / (1 + L)| [1].
-    pub(in crate::tool) peak_sensitivity: f64,
+    pub(crate) peak_sensitivity: f64,
     /// Frequency from which on the feature follows its setpoint by less than 71 % [Hz].
-    pub(in crate::tool) bandwidth_hz: Option<f64>,
+    pub(crate) bandwidth_hz: Option<f64>,
     /// Error of the feature for a steady motion of one unit in each second [s].
-    pub(in crate::tool) ramp_lag_s: f64,
+    pub(crate) ramp_lag_s: f64,
     /// Standard deviation of the feature for one of white noise in the measurement [1].
-    pub(in crate::tool) noise: f64,
+    pub(crate) noise: f64,
 }
 
 /// Number of frequencies of a sweep; two neighbours differ by a third of a percent.
@@ -34,7 +34,7 @@ const FREQUENCIES: usize = 4000;
 const SPAN: f64 = 1e-6;
 
 /// Sweeps a loop up to half of the rate of the graph.
-pub(in crate::tool) fn margins(around: &Loop) -> Margins {
+pub(crate) fn margins(around: &Loop) -> Margins {
     let top = PI / around.period;
     let open: Vec<(f64, Complex<f64>)> = sweep(top).map(|omega| (omega, around.open(omega))).collect();
     let crossings = crossings(&open);

@@ -12,26 +12,26 @@ use nalgebra::Complex;
 
 use super::contacts::{Answer, Contact};
 use super::law::Feature;
-use super::shape::Shape;
+use super::shape::{Shape, turn};
 
 /// The loop of one feature over one contact.
 #[derive(Debug, Clone)]
-pub(in crate::tool) struct Loop {
+pub(crate) struct Loop {
     kp: f64,
     ki: f64,
     kd: f64,
     shapes: Vec<Shape>,
     /// Change of the feature for each unit of the control, over time.
-    pub(in crate::tool) gain: f64,
+    pub(crate) gain: f64,
     resonance: Option<(f64, f64)>,
     latency: f64,
-    pub(in crate::tool) period: f64,
+    pub(crate) period: f64,
 }
 
 impl Loop {
     /// Returns the loop of a feature over a contact; `None` if neither the bench nor geometry says how the feature
     /// answers the motion of its column.
-    pub(in crate::tool) fn over(feature: &Feature, contact: &Contact, period: f64) -> Option<Self> {
+    pub(crate) fn over(feature: &Feature, contact: &Contact, period: f64) -> Option<Self> {
         let quantity = feature.measured.as_ref()?.rsplit('.').next()?;
         let answer = contact.answer(quantity)?;
         let latency_ms = answer.latency_ms.unwrap_or(contact.latency_ms);
@@ -40,7 +40,7 @@ impl Loop {
     }
 
     /// Returns the loop of a feature, with the latency and the period [s].
-    pub(in crate::tool) fn new(feature: &Feature, answer: &Answer, latency: f64, period: f64) -> Self {
+    pub(crate) fn new(feature: &Feature, answer: &Answer, latency: f64, period: f64) -> Self {
         let gain = answer.row().iter().zip(feature.column).map(|(answer, column)| answer * column).sum();
         let Feature { kp, ki, kd, .. } = *feature;
         let shapes = feature.filters.iter().map(|filter| filter.shape).collect();
@@ -48,39 +48,39 @@ impl Loop {
     }
 
     /// Returns the same loop with all gains of the controller times a factor.
-    pub(in crate::tool) fn times(&self, factor: f64) -> Self {
+    pub(crate) fn times(&self, factor: f64) -> Self {
         let [kp, ki, kd] = [self.kp, self.ki, self.kd].map(|gain| gain * factor);
         Self { kp, ki, kd, ..self.clone() }
     }
 
     /// Returns the number of poles at zero: the motion integrates, and so does `ki`.
-    pub(in crate::tool) fn integrators(&self) -> usize {
+    pub(crate) fn integrators(&self) -> usize {
         if self.ki == 0.0 { 1 } else { 2 }
     }
 
     /// Returns the proportional gain around the loop [rad/s].
-    pub(in crate::tool) fn proportional(&self) -> f64 {
+    pub(crate) fn proportional(&self) -> f64 {
         self.kp * self.gain
     }
 
     /// Returns whether the motion increases the error.
-    pub(in crate::tool) fn is_reversed(&self) -> bool {
+    pub(crate) fn is_reversed(&self) -> bool {
         [self.kp, self.ki, self.kd].iter().any(|gain| gain * self.gain < 0.0)
     }
 
     /// Returns how long the error of a steady ramp is ahead [s]: the lag of `kp` without an integral, and all delays.
-    pub(in crate::tool) fn ramp_lag(&self) -> f64 {
+    pub(crate) fn ramp_lag(&self) -> f64 {
         let lag = if self.ki == 0.0 { 1.0 / self.proportional() } else { 0.0 };
         lag + self.latency + self.shapes.iter().map(|shape| shape.delay(self.period)).sum::<f64>()
     }
 
     /// Returns L at a circular frequency [rad/s].
-    pub(in crate::tool) fn open(&self, omega: f64) -> Complex<f64> {
+    pub(crate) fn open(&self, omega: f64) -> Complex<f64> {
         self.known(omega) * arm(omega, self.resonance) * turn(omega * self.latency) * self.gain
     }
 
     /// Returns the response of controller, travel and filters, which a graph states.
-    pub(in crate::tool) fn known(&self, omega: f64) -> Complex<f64> {
+    pub(crate) fn known(&self, omega: f64) -> Complex<f64> {
         let filters: Complex<f64> = self.shapes.iter().map(|shape| shape.response(omega, self.period)).product();
         self.control(omega) * filters * travel(omega, self.period)
     }
@@ -99,15 +99,10 @@ fn travel(omega: f64, period: f64) -> Complex<f64> {
 }
 
 /// Returns the response of a resonance with its circular frequency [rad/s] and damping ratio.
-pub(in crate::tool) fn arm(omega: f64, resonance: Option<(f64, f64)>) -> Complex<f64> {
+pub(crate) fn arm(omega: f64, resonance: Option<(f64, f64)>) -> Complex<f64> {
     let Some((own, damping)) = resonance else { return Complex::from(1.0) };
     let ratio = omega / own;
     Complex::from(1.0) / Complex::new(1.0 - ratio * ratio, 2.0 * damping * ratio)
-}
-
-/// Returns exp(-j angle).
-pub(in crate::tool) fn turn(angle: f64) -> Complex<f64> {
-    Complex::new(libm::cos(angle), -libm::sin(angle))
 }
 
 #[cfg(test)]

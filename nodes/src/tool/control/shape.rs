@@ -2,11 +2,9 @@
 
 use nalgebra::Complex;
 
-use super::response::turn;
-
 /// A linear filter of samples.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(in crate::tool) enum Shape {
+pub(crate) enum Shape {
     /// A first-order low-pass filter with a time constant [s].
     LowPass {
         /// Time constant [s].
@@ -27,7 +25,7 @@ pub(in crate::tool) enum Shape {
 impl Shape {
     /// Returns the delay that the filter gives to a slow ramp, for samples at `period` [s]: the time constant of a
     /// low-pass, and half of a window.
-    pub(in crate::tool) fn delay(self, period: f64) -> f64 {
+    pub(crate) fn delay(self, period: f64) -> f64 {
         match self {
             Self::LowPass { time } => time,
             Self::Mean { samples } | Self::Median { samples } => (samples - 1.0) / 2.0 * period,
@@ -35,7 +33,7 @@ impl Shape {
     }
 
     /// Returns the response at a circular frequency [rad/s], for samples at `period` [s].
-    pub(in crate::tool) fn response(self, omega: f64, period: f64) -> Complex<f64> {
+    pub(crate) fn response(self, omega: f64, period: f64) -> Complex<f64> {
         let one = Complex::from(1.0);
         let angle = omega * period;
         match self {
@@ -47,6 +45,11 @@ impl Shape {
             Self::Median { .. } => turn(omega * self.delay(period)),
         }
     }
+}
+
+/// Returns exp(-j angle).
+pub(crate) fn turn(angle: f64) -> Complex<f64> {
+    Complex::new(libm::cos(angle), -libm::sin(angle))
 }
 
 #[cfg(test)]

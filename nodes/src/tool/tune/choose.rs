@@ -37,18 +37,20 @@ const STEP: f64 = 1.1;
 /// Gain around a loop in one period above which nothing is tried [1].
 const MAX_SHARE: f64 = 0.5;
 
-/// Returns the largest factor on all gains of a feature with which each of its loops keeps the margins, as all smaller
-/// ones do; `None` if there is none.
+/// Returns the largest factor on all gains of a feature up to which each of its loops keeps the margins; `None` if there
+/// is none. With an integral, the margins do not hold for very small gains.
 pub(super) fn factor(loops: &[Loop], wanted: Wanted) -> Option<f64> {
     let share = |around: &Loop, factor: f64| around.proportional().abs() * around.period * factor;
-    let holds = |factor: f64| {
-        loops.iter().all(|around| share(around, factor) < MAX_SHARE && wanted.holds(&margins(&around.times(factor))))
-    };
+    let is_tried = |factor: f64| loops.iter().all(|around| share(around, factor) < MAX_SHARE);
+    let holds =
+        |factor: f64| is_tried(factor) && loops.iter().all(|around| wanted.holds(&margins(&around.times(factor))));
     // From a crossover that is far below the rate of the graph.
-    let slow = loops.iter().map(|around| 1e-4 / share(around, 1.0)).reduce(f64::min)?;
-    let mut low = slow;
-    if !holds(low) {
-        return None;
+    let mut low = loops.iter().map(|around| 1e-4 / share(around, 1.0)).reduce(f64::min)?;
+    while !holds(low) {
+        low *= STEP;
+        if !is_tried(low) {
+            return None;
+        }
     }
     while holds(low * STEP) {
         low *= STEP;
@@ -68,11 +70,15 @@ mod tests {
     use crate::tool::control::law::Feature;
 
     fn around(gain: f64, delay: f64) -> Loop {
+        with_integral(gain, delay, 0.0)
+    }
+
+    fn with_integral(gain: f64, delay: f64, ki: f64) -> Loop {
         let feature = Feature {
             name: "pressure".into(),
             column: [0.0, 0.0, 1.0, 0.0, 0.0, 0.0],
             kp: 1.0,
-            ki: 0.0,
+            ki,
             kd: 0.0,
             measured: None,
             setpoint: None,
@@ -97,6 +103,13 @@ mod tests {
         let found = factor(&[around(2.0, 0.05)], wanted).unwrap();
         let exact = std::f64::consts::PI / (2.0 * 2.0 * 0.05) / 10.0_f64.powf(9.0 / 20.0);
         assert!((found / exact - 1.0).abs() < 0.03, "{found} and {exact}");
+    }
+
+    #[test]
+    fn an_integral_does_not_hide_the_gains_that_hold() {
+        let (with, without) = (with_integral(2.0, 0.05, 0.2), around(2.0, 0.05));
+        let [with, without] = [with, without].map(|one| factor(&[one], Wanted::default()).unwrap());
+        assert!(with < without && with > 0.8 * without, "{with} and {without}");
     }
 
     #[test]

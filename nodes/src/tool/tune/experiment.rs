@@ -11,22 +11,64 @@ use tactflow_runtime::graph::{Outline, OutlinedMode, Request, compile};
 use tactflow_runtime::record::PortColumns;
 
 use crate::tool::control::law::{COMPONENTS, Feature};
-use crate::tool::control::response::turn;
+use crate::tool::control::shape::turn;
 
-/// Period of the test signal [s].
-const PERIOD_S: f64 = 4.0;
-/// Lowest and highest frequency of the test signal [Hz].
-const BAND_HZ: [f64; 2] = [0.25, 8.0];
-/// Periods for the response to become periodic.
-const SETTLING: usize = 1;
-/// Periods that are measured: more tell noise better.
-const MEASURED: usize = 4;
+/// Lowest frequency of the test signal [Hz].
+const LOWEST_HZ: f64 = 0.35;
+/// Number of frequencies, each √2 times the one before.
+const FREQUENCIES: usize = 10;
+/// Time after the begin of the mode until the test signal begins [s].
+const BEGIN_S: f64 = 6.0;
+/// Time for the response to a frequency to become periodic [s], and at least one period.
+const SETTLING_S: f64 = 1.0;
+/// Time in which a frequency is measured [s], and at least three periods.
+const MEASURING_S: f64 = 2.0;
+/// Largest speed of the test signal [m/s], [rad/s]: ceilings of force let a pad move no faster into an object.
+const FASTEST: [f64; 2] = [0.006, 0.15];
 /// Time for the approach [s].
 const APPROACH_S: f64 = 20.0;
-/// Name of the test signal in the graph.
-const SIGNAL: &str = "tune_signal";
-/// Name of its twist in the graph.
-const TWIST: &str = "tune_twist";
+/// Beginning of the names of the nodes that make the test signal.
+const SIGNAL: &str = "tune";
+
+/// One sine of the test signal.
+#[derive(Debug, Clone, Copy)]
+struct Sine {
+    /// Number of ticks in a period.
+    ticks: usize,
+    /// Tick at which it begins, counted from the begin of the mode.
+    begin: usize,
+    /// Number of periods for the response to settle.
+    settling: usize,
+    /// Number of periods that are measured.
+    measured: usize,
+}
+
+impl Sine {
+    /// Returns the sines of a test signal, one after the other, for ticks of `period` [s].
+    fn all(period: f64) -> Vec<Self> {
+        let mut begin = (BEGIN_S / period).round() as usize;
+        let mut sine = |k: usize| {
+            let hz = LOWEST_HZ * libm::exp2(k as f64 / 2.0);
+            let ticks = (1.0 / (hz * period)).round().max(4.0) as usize;
+            let periods = |seconds: f64| (seconds / (ticks as f64 * period)).ceil() as usize;
+            let sine =
+                Self { ticks, begin, settling: periods(SETTLING_S).max(1), measured: periods(MEASURING_S).max(3) };
+            begin = sine.end();
+            sine
+        };
+        (0..FREQUENCIES).map(&mut sine).collect()
+    }
+
+    /// Returns the tick after its last one.
+    const fn end(&self) -> usize {
+        self.begin + (self.settling + self.measured) * self.ticks
+    }
+
+    /// Returns its amplitude as a speed, for a way [m] or [rad].
+    fn speed(&self, way: f64, fastest: f64, period: f64) -> f64 {
+        (2.0 * PI * way / (self.ticks as f64 * period)).min(fastest)
+    }
+}
 
 /// The loop that an experiment opens with its signal.
 #[derive(Clone)]
@@ -39,6 +81,8 @@ pub(super) struct Experiment<'a> {
     pub(super) feature: &'a Feature,
     /// The component of the twist that is moved.
     pub(super) component: usize,
+    /// Period of the graph [s].
+    pub(super) period: f64,
 }
 
 /// The response at one frequency.
@@ -86,19 +130,18 @@ pub(super) fn long_enough(outline: &Outline, seconds: f64) -> impl Iterator<Item
     limited.map(move |device| format!("devices.{}.for_s={seconds:?}", device.name))
 }
 
-/// Returns how long an experiment takes at most [s].
-pub(super) const fn duration() -> f64 {
-    APPROACH_S + (SETTLING + MEASURED) as f64 * PERIOD_S
+/// Returns how long an experiment takes at most, for ticks of `period` [s].
+pub(super) fn duration(period: f64) -> f64 {
+    APPROACH_S + Sine::all(period).last().map_or(0.0, |sine| sine.end() as f64 * period)
 }
 
 impl Experiment<'_> {
-    /// Runs with a signal of that amplitude in the unit of its component, at half of the gains.
+    /// Runs with a signal that moves the sensor to and fro by a way [m] or [rad], at half of the gains.
     ///
     /// # Errors
     /// If the graph with the signal does not load.
-    pub(super) fn run(&self, amplitude: f64) -> Result<Answered, String> {
-        let request =
-            Request { set: [&self.request.set[..], &self.settings(amplitude)].concat(), ..self.request.clone() };
+    pub(super) fn run(&self, way: f64) -> Result<Answered, String> {
+        let request = Request { set: [&self.request.set[..], &self.settings(way)].concat(), ..self.request.clone() };
         let compiled = compile(self.catalogue, &request).map_err(|report| report.render(false))?;
         let mut engine = Engine::new(compiled);
         let pid = self.feature.pid.as_deref().unwrap_or_default();
@@ -106,24 +149,23 @@ impl Experiment<'_> {
             PortColumns::find(engine.ports(), &name).ok_or_else(|| format!("no port is `{name}`"))
         };
         let control = find(&engine, format!("{pid}.control.{}", self.feature.name))?;
-        let signal = find(&engine, format!("{SIGNAL}.value"))?;
-        let (mut rows, mut left) = (Vec::new(), None);
-        let period = engine.period() as f64 * 1e-9;
-        let in_period = (PERIOD_S / period).round() as usize;
-        let wanted = (SETTLING + MEASURED) * in_period;
+        let all = find(&engine, format!("{}.twist.{}", self.adder, COMPONENTS[self.component]))?;
+        let sines = Sine::all(self.period);
+        let wanted = sines.last().map_or(0, Sine::end);
+        let (mut rows, mut left): (Vec<[f64; 2]>, Option<String>) = (Vec::new(), None);
         let cancel = Arc::new(AtomicBool::new(false));
-        let options = RunOptions { duration: Some(duration()), cancel: Some(cancel.clone()), ..RunOptions::default() };
+        let options =
+            RunOptions { duration: Some(duration(self.period)), cancel: Some(cancel.clone()), ..RunOptions::default() };
         let column = self.feature.column[self.component];
         let outcome = run(&mut engine, &options, &mut |engine| {
-            let Some(added) = engine.bus().scalar(signal) else {
-                if !rows.is_empty() && rows.len() < wanted {
-                    left.get_or_insert_with(|| engine.mode().unwrap_or("the end").to_owned());
-                }
-                return;
-            };
-            rows.push([engine.bus().scalar(control).unwrap_or(f64::NAN) * column, added]);
-            if rows.len() >= wanted {
-                cancel.store(true, Ordering::Relaxed);
+            let is_in = engine.mode() == Some(&*self.mode.name);
+            if !is_in && !rows.is_empty() && rows.len() < wanted {
+                left.get_or_insert_with(|| engine.mode().unwrap_or("the end").to_owned());
+            }
+            if is_in && rows.len() < wanted {
+                let read = |port| engine.bus().scalar(port).unwrap_or(f64::NAN);
+                rows.push([read(control) * column, read(all)]);
+                cancel.store(rows.len() >= wanted, Ordering::Relaxed);
             }
         });
         let outcome = outcome.map_err(|error| format!("the run cannot start: {error}"))?;
@@ -132,32 +174,39 @@ impl Experiment<'_> {
             (End::Fault(fault), _) => Answered::Nothing(fault.to_string()),
             (_, Some(mode)) => Answered::Nothing(format!("the mode `{}` was left for `{mode}`", self.mode.name)),
             _ if rows.len() < wanted => {
-                let seconds = rows.len() as f64 * period;
+                let seconds = rows.len() as f64 * self.period;
                 Answered::Nothing(format!("the mode `{}` lasted {seconds:.1} s only", self.mode.name))
             }
-            _ if rows.iter().flatten().any(|value| !value.is_finite()) => {
+            _ if rows[sines[0].begin..].iter().flatten().any(|value| !value.is_finite()) => {
                 Answered::Nothing(format!("`{}` was absent for a while", self.feature.name))
             }
-            _ => Answered::Lines(lines(&rows, in_period, period)),
+            _ => Answered::Lines(sines.iter().map(|sine| line(&rows, sine, self.period)).collect()),
         })
     }
 
     /// Returns the settings of a run: the signal, its way into the motion, and half of the gains.
-    fn settings(&self, amplitude: f64) -> Vec<String> {
+    fn settings(&self, way: f64) -> Vec<String> {
         let unit = if self.component < 3 { "m/s" } else { "rad/s" };
-        let [low, high] = BAND_HZ;
-        let mut set = vec![
-            format!("nodes.{SIGNAL}.type=multisine"),
-            format!("nodes.{SIGNAL}.in.gate=modes.{}", self.mode.name),
-            format!("nodes.{SIGNAL}.unit={unit}"),
-            format!("nodes.{SIGNAL}.amplitude={amplitude:?}"),
-            format!("nodes.{SIGNAL}.period={PERIOD_S:?}"),
-            format!("nodes.{SIGNAL}.min_frequency={low:?}"),
-            format!("nodes.{SIGNAL}.max_frequency={high:?}"),
-            format!("nodes.{TWIST}.type=compose_twist"),
-            format!("nodes.{TWIST}.in.{}={SIGNAL}.value", COMPONENTS[self.component]),
-            format!("nodes.{}.in.{TWIST}={TWIST}.twist", self.adder),
-        ];
+        let fastest = FASTEST[self.component / 3];
+        let mut set = Vec::new();
+        for (i, sine) in Sine::all(self.period).iter().enumerate() {
+            let hz = 1.0 / (sine.ticks as f64 * self.period);
+            let lasts = (sine.end() - sine.begin) as f64 * self.period;
+            let (signal, twist) = (format!("{SIGNAL}_signal_{i}"), format!("{SIGNAL}_twist_{i}"));
+            set.extend([
+                format!("nodes.{signal}.type=signal_generator"),
+                format!("nodes.{signal}.in.gate=modes.{}", self.mode.name),
+                format!("nodes.{signal}.form=sine"),
+                format!("nodes.{signal}.unit={unit}"),
+                format!("nodes.{signal}.amplitude={:?}", sine.speed(way, fastest, self.period)),
+                format!("nodes.{signal}.frequency={hz:?}"),
+                format!("nodes.{signal}.start={:?}", sine.begin as f64 * self.period),
+                format!("nodes.{signal}.duration={lasts:?}"),
+                format!("nodes.{twist}.type=compose_twist"),
+                format!("nodes.{twist}.in.{}={signal}.value", COMPONENTS[self.component]),
+                format!("nodes.{}.in.{twist}={twist}.twist", self.adder),
+            ]);
+        }
         let Feature { kp, ki, kd, column, .. } = *self.feature;
         set.extend(gains(self.feature, self.mode, [kp / 2.0, ki / 2.0, kd / 2.0]));
         if column.iter().filter(|entry| **entry != 0.0).count() > 1 {
@@ -169,28 +218,25 @@ impl Experiment<'_> {
     }
 }
 
-/// Returns the spectrum of the last periods. Each row is the motion by the controller, and the signal added to it.
-fn lines(rows: &[[f64; 2]], in_period: usize, period: f64) -> Vec<Line> {
-    let [low, high] = BAND_HZ.map(|hz| (hz * PERIOD_S).round() as usize);
-    let periods: Vec<&[[f64; 2]]> = rows[SETTLING * in_period..].chunks_exact(in_period).collect();
-    let line = |harmonic: usize| {
-        let omega = 2.0 * PI * harmonic as f64 / (in_period as f64 * period);
-        let spectra: Vec<[Complex<f64>; 2]> = periods.iter().map(|rows| spectrum(rows, harmonic)).collect();
-        let sum = |of: &dyn Fn(&[Complex<f64>; 2]) -> Complex<f64>| spectra.iter().map(of).sum::<Complex<f64>>();
-        let cross = sum(&|[by, all]| by * all.conj());
-        let [own, whole] = [0, 1].map(|i| sum(&|pair| Complex::from(pair[i].norm_sqr())).re);
-        Line { omega, open: -cross / whole, coherence: cross.norm_sqr() / (own * whole) }
-    };
-    (low..=high).map(line).collect()
+/// Returns the response to one sine. Each row is the motion by the controller, and the whole motion.
+fn line(rows: &[[f64; 2]], sine: &Sine, period: f64) -> Line {
+    let measured = &rows[sine.begin + sine.settling * sine.ticks..sine.end()];
+    let spectra: Vec<[Complex<f64>; 2]> = measured.chunks_exact(sine.ticks).map(first_harmonic).collect();
+    // The noise of the measurement moves the sensor too. The mean over the periods keeps what follows the signal.
+    let mean = |i: usize| spectra.iter().map(|pair| pair[i]).sum::<Complex<f64>>() / spectra.len() as f64;
+    let power = spectra.iter().map(|pair| pair[0].norm_sqr()).sum::<f64>() / spectra.len() as f64;
+    Line {
+        omega: 2.0 * PI / (sine.ticks as f64 * period),
+        open: -mean(0) / mean(1),
+        coherence: mean(0).norm_sqr() / power,
+    }
 }
 
-/// Returns one harmonic of the motion by the controller, and of the whole motion.
-fn spectrum(rows: &[[f64; 2]], harmonic: usize) -> [Complex<f64>; 2] {
-    let (mut by, mut all) = (Complex::from(0.0), Complex::from(0.0));
-    for (i, [control, added]) in rows.iter().enumerate() {
-        let phase = turn(2.0 * PI * ((harmonic * i) % rows.len()) as f64 / rows.len() as f64);
-        by += phase * *control;
-        all += phase * (control + added);
-    }
-    [by, all]
+/// Returns the first harmonic of one period: of the motion by the controller, and of the whole motion.
+fn first_harmonic(rows: &[[f64; 2]]) -> [Complex<f64>; 2] {
+    let sum = |of: usize| {
+        let part = |(i, row): (usize, &[f64; 2])| turn(2.0 * PI * i as f64 / rows.len() as f64) * row[of];
+        rows.iter().enumerate().map(part).sum::<Complex<f64>>()
+    };
+    [sum(0), sum(1)]
 }

@@ -4,7 +4,8 @@ use nalgebra::Complex;
 use serde::Serialize;
 
 use super::experiment::Line;
-use crate::tool::control::response::{arm, turn};
+use crate::tool::control::response::arm;
+use crate::tool::control::shape::turn;
 
 /// How a feature answers one component of the motion.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
@@ -24,7 +25,10 @@ pub(super) struct Fit {
 /// Smallest coherence of a frequency that counts.
 pub(super) const COHERENT: f64 = 0.8;
 /// Smallest number of frequencies that tell a resonance from a delay.
-pub(super) const ENOUGH: usize = 6;
+pub(super) const ENOUGH: usize = 5;
+
+/// Smallest damping ratio of an arm in contact: a sharper peak between two frequencies is a mistake of the fit [1].
+const MIN_DAMPING: f64 = 0.05;
 
 /// The answer at one frequency: circular frequency [rad/s], response and weight.
 type Point = (f64, Complex<f64>, f64);
@@ -38,10 +42,13 @@ pub(super) fn fit(lines: &[Line], known: impl Fn(f64) -> Complex<f64>) -> Result
         return Err(points.len());
     }
     let top = points.last().map_or(1.0, |point| point.0);
-    let mut best =
-        search(&points, [Span::log(0.3 * 6.28, 2.0 * top, 24), Span::log(0.03, 1.5, 10), Span::new(0.0, 0.08, 9)]);
+    let mut best = search(
+        &points,
+        [Span::log(0.3 * 6.28, 2.0 * top, 24), Span::log(MIN_DAMPING, 1.5, 10), Span::new(0.0, 0.08, 9)],
+    );
     for _ in 0..8 {
-        let near = best.spans.map(|span| span.closer(9));
+        let mut near = best.spans.map(|span| span.closer(9));
+        near[1].low = near[1].low.max(MIN_DAMPING);
         best = search(&points, near);
     }
     let plain = search(&points, [Span::log(1e4, 1e4, 1), Span::log(1.0, 1.0, 1), Span::new(0.0, 0.12, 121)]);

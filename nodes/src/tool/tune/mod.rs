@@ -30,10 +30,10 @@ use trial::Settled;
 #[derive(clap::Parser)]
 #[command(
     name = "tune",
-    after_help = "It runs the task and moves the robot: with half of the gains, it adds a test signal of 0.25 to 8 Hz to the motion, for each
-feature that the mode controls, and doubles it until two of them agree. All limits of the graph hold. From the answers it
-fits a gain, a resonance and a latency, and proposes the largest gains that keep the margins over all contacts. Then it
-runs the task with them, and compares.
+    after_help = "It runs the task and moves the robot. For each feature that the mode controls, it halves the gains, moves the sensor to and
+fro with sines of 0.35 to 8 Hz, one after the other, and doubles their way until two of them agree. This takes about a
+minute for each way. All limits of the graph hold. From the answers it fits a gain, a resonance and a latency, and
+proposes the largest gains that keep the margins over all contacts. Then it runs the task with them, and compares.
 
 Examples:
   tactflow tune graphs/hybrid.toml
@@ -90,6 +90,9 @@ struct Tuned {
     arm: String,
     wanted: Wanted,
     contacts: Vec<Contact>,
+    /// The bench of each contact.
+    #[serde(skip)]
+    files: Vec<Option<PathBuf>>,
     features: Vec<TunedFeature>,
     /// How the task holds its features with the old and with the new gains, for each bench.
     settled: Vec<Settled>,
@@ -164,12 +167,14 @@ fn tune(args: &TuneArgs, shell: &Shell, request: &Request, compiled: &Compiled) 
     let adder = adder(outline, &twist)?;
     let wanted = Wanted { peak: args.peak, gain_db: args.gain_margin, phase_deg: args.phase_margin };
     let benches: Vec<Option<PathBuf>> = [None].into_iter().chain(args.others.iter().cloned().map(Some)).collect();
-    let mut contacts: Vec<Contact> = Vec::new();
+    let (mut contacts, mut files) = (Vec::new(), Vec::new());
     let mut answers: Vec<Vec<Found>> = controlled.iter().map(|_| Vec::new()).collect();
     for bench in &benches {
-        let request = on_bench(request, bench.as_ref(), shell)?;
+        let (request, file) = on_bench(request, bench.as_ref(), shell)?;
+        let object = file.as_ref().and_then(|file| file.file_stem()).map(|stem| stem.to_string_lossy().into_owned());
+        files.push(file);
         let mut contact =
-            Contact { object: object(outline, args, bench.as_ref()), latency_ms: 0.0, features: BTreeMap::new() };
+            Contact { object: object.unwrap_or_else(|| "object".into()), latency_ms: 0.0, features: BTreeMap::new() };
         for (feature, answers) in controlled.iter().zip(&mut answers) {
             let experiment = Experiment {
                 catalogue: shell.catalogue(),
@@ -178,10 +183,12 @@ fn tune(args: &TuneArgs, shell: &Shell, request: &Request, compiled: &Compiled) 
                 adder: &adder,
                 feature,
                 component: 0,
+                period: outline.period_s,
             };
             let found = identify(&experiment, &contact.object, outline.period_s, shell)?;
             if found.refused.is_none() {
-                contact.features.insert(quantity(feature), answer(&found.fits));
+                let quantity = quantity(feature);
+                contact.features.insert(quantity.clone(), answer(&quantity, &found.fits));
             }
             answers.push(found);
         }
@@ -193,9 +200,9 @@ fn tune(args: &TuneArgs, shell: &Shell, request: &Request, compiled: &Compiled) 
         .map(|(feature, answers)| propose(feature, answers, &contacts, wanted, outline.period_s))
         .collect();
     let arm = command.trim_end_matches(".velocity").to_owned();
-    let mut tuned = Tuned { mode: mode.name.clone(), arm, wanted, contacts, features, settled: Vec::new() };
+    let mut tuned = Tuned { mode: mode.name.clone(), arm, wanted, contacts, files, features, settled: Vec::new() };
     for (bench, contact) in benches.iter().zip(&tuned.contacts) {
-        let request = on_bench(request, bench.as_ref(), shell)?;
+        let (request, _) = on_bench(request, bench.as_ref(), shell)?;
         tuned.settled.extend(trial::compare(shell.catalogue(), &request, mode, &tuned.features, &contact.object)?);
     }
     Ok(tuned)
@@ -248,24 +255,17 @@ fn adder(outline: &Outline, twist: &str) -> Result<String, String> {
         .ok_or_else(|| format!("the motion `{twist}` comes from no `twist_adder`; {help}\"{twist}\""))
 }
 
-/// Returns the request for another bench, and lets simulated devices run long enough.
-fn on_bench(request: &Request, bench: Option<&PathBuf>, shell: &Shell) -> Result<Request, String> {
+/// Returns the request for another bench with its file, and lets simulated devices run long enough.
+fn on_bench(request: &Request, bench: Option<&PathBuf>, shell: &Shell) -> Result<(Request, Option<PathBuf>), String> {
     let mut request = Request { bench: bench.cloned().or_else(|| request.bench.clone()), ..request.clone() };
     let compiled = compile(shell.catalogue(), &request).map_err(|report| report.render(false))?;
-    request.set.extend(experiment::long_enough(compiled.outline(), experiment::duration()));
-    Ok(request)
+    request.set.extend(experiment::long_enough(compiled.outline(), experiment::duration(compiled.outline().period_s)));
+    Ok((request, bench_file(&compiled)))
 }
 
-/// Returns the name of an object: that of its bench.
-fn object(outline: &Outline, args: &TuneArgs, bench: Option<&PathBuf>) -> String {
-    let own = || {
-        let of_graph = outline.settings.iter().find(|setting| setting.path == "bench");
-        of_graph.and_then(|setting| setting.value.read::<String>()).map(PathBuf::from)
-    };
-    let file = bench.cloned().or_else(|| args.graph_args.bench.clone()).or_else(own);
-    file.as_ref()
-        .and_then(|file| file.file_stem())
-        .map_or_else(|| "object".into(), |stem| stem.to_string_lossy().into_owned())
+/// Returns the file of the bench that a request uses, as the places of its devices say.
+fn bench_file(compiled: &Compiled) -> Option<PathBuf> {
+    compiled.outline().devices.first().map(|device| PathBuf::from(&device.place.file))
 }
 
 /// Returns the name of what a feature measures.
@@ -274,12 +274,15 @@ fn quantity(feature: &Feature) -> String {
     port.rsplit('.').next().unwrap_or(port).to_owned()
 }
 
-/// First amplitude of a linear [m/s] and of an angular test signal [rad/s].
-const FIRST: [f64; 2] = [0.001, 0.02];
-/// Number of times that the amplitude is doubled.
-const DOUBLINGS: usize = 5;
+/// First way of a linear [m] and of an angular test signal [rad].
+const FIRST: [f64; 2] = [0.15e-3, 0.005];
+/// Number of times that the way is doubled.
+const DOUBLINGS: usize = 4;
 /// Difference of two responses that agree, as the median of all frequencies [1].
-const AGREES: f64 = 0.15;
+const AGREES: f64 = 0.2;
+
+/// Part of the response that a fit may leave unexplained [1].
+const MAX_RESIDUAL: f64 = 0.3;
 
 /// Measures how a feature answers each component that moves it.
 fn identify(experiment: &Experiment<'_>, object: &str, period: f64, shell: &Shell) -> Result<Found, Stop> {
@@ -291,6 +294,12 @@ fn identify(experiment: &Experiment<'_>, object: &str, period: f64, shell: &Shel
         let known = known(feature, component, period);
         match agreed(&experiment, shell)? {
             Ok(lines) => match fit(&lines, known) {
+                Ok(fit) if fit.residual > MAX_RESIDUAL => {
+                    found.refused = Some(format!(
+                        "a gain, a resonance and a latency leave {:.0} % of the response unexplained",
+                        100.0 * fit.residual
+                    ));
+                }
                 Ok(fit) => found.fits.push((super::control::law::COMPONENTS[component], fit)),
                 Err(few) => {
                     found.refused = Some(format!(
@@ -319,15 +328,15 @@ fn known(feature: &Feature, component: usize, period: f64) -> impl Fn(f64) -> na
 /// Doubles the test signal until two responses agree: friction hides a small motion, and limits spoil a large one.
 fn agreed(experiment: &Experiment<'_>, shell: &Shell) -> Result<Result<Vec<Line>, String>, Stop> {
     let mut last: Option<Vec<Line>> = None;
-    let mut why = "no two amplitudes of the test signal gave the same response".to_owned();
+    let mut why = "no two ways of the test signal gave the same response".to_owned();
     for doubling in 0..=DOUBLINGS {
-        let amplitude = FIRST[experiment.component / 3] * f64::from(1_u32 << doubling);
-        let unit = if experiment.component < 3 { "m/s" } else { "rad/s" };
-        shell.say_beside(&format!("`{}`: a test signal of {amplitude} {unit}", experiment.feature.name));
-        let lines = match experiment.run(amplitude)? {
+        let way = FIRST[experiment.component / 3] * f64::from(1_u32 << doubling);
+        let unit = if experiment.component < 3 { "m" } else { "rad" };
+        shell.say_beside(&format!("`{}`: a test signal of {way} {unit}", experiment.feature.name));
+        let lines = match experiment.run(way)? {
             Answered::Lines(lines) => lines,
             Answered::Nothing(reason) => {
-                why = format!("with a test signal of {amplitude} {unit}, {reason}");
+                why = format!("with a test signal of {way} {unit}, {reason}");
                 break;
             }
             Answered::Interrupted => return Err(Stop::Interrupted),
@@ -348,8 +357,12 @@ fn difference(one: &[Line], other: &[Line]) -> Option<f64> {
     far.get(far.len() / 2).copied().filter(|_| far.len() >= ENOUGH)
 }
 
-/// Returns the answer of a feature to all components. The resonance and the latency are those of the strongest one.
-fn answer(fits: &[(&'static str, Fit)]) -> Answer {
+/// Returns the answer of a feature to all components. The resonance and the latency are those of the first one.
+///
+/// A contact that sticks follows a small motion only in part. It can slide at any time, so what geometry says counts if
+/// it is more.
+fn answer(quantity: &str, fits: &[(&'static str, Fit)]) -> Answer {
+    let geometry = Answer::of_geometry(quantity).unwrap_or_default().row();
     let mut answer = Answer::default();
     for (component, fit) in fits {
         let entry = match *component {
@@ -360,7 +373,9 @@ fn answer(fits: &[(&'static str, Fit)]) -> Answer {
             "wy" => &mut answer.wy,
             _ => &mut answer.wz,
         };
-        *entry = Some(page::rounded(fit.gain));
+        let index = super::control::law::COMPONENTS.iter().position(|name| name == component);
+        let slides = index.map_or(0.0, |i| geometry[i]);
+        *entry = Some(if slides.abs() > fit.gain.abs() { slides } else { page::rounded(fit.gain) });
     }
     let Some((_, main)) = fits.first() else { return answer };
     answer.resonance_hz = main.resonance.map(|(hz, _)| page::rounded(hz));

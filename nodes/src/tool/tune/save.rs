@@ -1,7 +1,5 @@
 //! Writes the gains into the graph, and the contacts into the benches. Comments and order stay.
 
-use std::path::PathBuf;
-
 use tactflow_runtime::cli::Shell;
 use tactflow_runtime::graph::Compiled;
 use toml_edit::{Array, InlineTable, Value};
@@ -29,26 +27,23 @@ pub(super) fn save(args: &TuneArgs, compiled: &Compiled, tuned: &Tuned, shell: &
             graph.set(section, last, gain)?;
         }
     }
-    let benches = [args.graph_args.bench.clone().or_else(|| own_bench(args, compiled))];
-    let benches = benches.into_iter().chain(args.others.iter().cloned().map(Some));
     let mut files = vec![graph];
-    for (bench, contact) in benches.zip(&tuned.contacts) {
+    for (bench, contact) in tuned.files.iter().zip(&tuned.contacts) {
         let Some(bench) = bench else { continue };
-        let mut file = BenchFile::read(&bench)?;
+        // A graph can have its own devices.
+        let is_graph = *bench == args.graph;
+        if !is_graph {
+            files.push(BenchFile::read(bench)?);
+        }
+        let Some(file) = (if is_graph { files.first_mut() } else { files.last_mut() }) else { continue };
         file.set(&["facts", &tuned.arm], "contacts", Array::from_iter([value(contact)]))?;
-        file.check(shell.catalogue())?;
-        files.push(file);
+        if !is_graph {
+            file.check(shell.catalogue())?;
+        }
     }
     files.iter().try_for_each(BenchFile::write)?;
     let written = files.iter().map(|file| format!("wrote {}:\n{}\n", file.path().display(), file.changes()));
     Ok(written.collect::<String>().trim_end().to_owned())
-}
-
-/// Returns the bench that a graph names, relative to its file.
-fn own_bench(args: &TuneArgs, compiled: &Compiled) -> Option<PathBuf> {
-    let setting = compiled.outline().settings.iter().find(|setting| setting.path == "bench")?;
-    let named = PathBuf::from(setting.value.read::<String>()?);
-    Some(args.graph.parent()?.join(named))
 }
 
 /// Writes a contact as an inline table.

@@ -67,12 +67,13 @@ fn hold(
     errors: &[&str],
 ) -> Result<(Vec<Option<f64>>, Option<String>), Stop> {
     let compiled = compile(catalogue, request).map_err(|report| report.render(false))?;
+    let period = compiled.outline().period_s;
     let mut engine = Engine::new(compiled);
     let columns = errors.iter().map(|name| {
         PortColumns::find(engine.ports(), name).ok_or_else(|| Stop::Refused(format!("no port is `{name}`")))
     });
     let columns: Vec<_> = columns.collect::<Result<_, _>>()?;
-    let options = RunOptions { duration: Some(experiment::duration()), ..RunOptions::default() };
+    let options = RunOptions { duration: Some(experiment::duration(period)), ..RunOptions::default() };
     let (mut rows, mut has_begun, mut left): (Vec<Vec<f64>>, bool, Option<String>) = (Vec::new(), false, None);
     let outcome = run(&mut engine, &options, &mut |engine| {
         let is_in = engine.mode() == Some(&*mode.name);
