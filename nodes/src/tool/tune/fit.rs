@@ -27,6 +27,8 @@ pub(super) const COHERENT: f64 = 0.8;
 /// Smallest number of frequencies that tell a resonance from a delay.
 pub(super) const ENOUGH: usize = 5;
 
+/// Smallest resonance that is tried [rad/s].
+const MIN_RESONANCE: f64 = 2.0;
 /// Smallest damping ratio of an arm in contact: a sharper peak between two frequencies is a mistake of the fit [1].
 const MIN_DAMPING: f64 = 0.05;
 
@@ -44,7 +46,7 @@ pub(super) fn fit(lines: &[Line], known: impl Fn(f64) -> Complex<f64>) -> Result
     let top = points.last().map_or(1.0, |point| point.0);
     let mut best = search(
         &points,
-        [Span::log(0.3 * 6.28, 2.0 * top, 24), Span::log(MIN_DAMPING, 1.5, 10), Span::new(0.0, 0.08, 9)],
+        [Span::log(MIN_RESONANCE, 2.0 * top, 24), Span::log(MIN_DAMPING, 1.5, 10), Span::new(0.0, 0.08, 9)],
     );
     for _ in 0..8 {
         let mut near = best.spans.map(|span| span.closer(9));
