@@ -111,3 +111,41 @@ fn one_port_is_explained_and_an_unknown_one_is_named() {
     assert_eq!(unknown.code, 2);
     assert!(unknown.err.contains("no node writes `move.bumples.twist`"), "{}", unknown.err);
 }
+
+/// The loops of the mode `servo`, each with the object and the feature.
+fn loops(args: &[&str]) -> Vec<Value> {
+    let explained = explained(args);
+    let modes = explained["motions"][0]["modes"].as_array().unwrap();
+    modes.iter().find(|mode| mode["mode"] == "servo").unwrap()["loops"].as_array().unwrap().clone()
+}
+
+#[test]
+fn margins_are_those_of_geometry_and_of_the_contacts_that_the_bench_states() {
+    let alone = loops(&["graphs/hybrid.toml"]);
+    let [x, _, pressure] = &alone[..] else { panic!("{alone:?}") };
+    // An integrator with a gain of 3.5 1/s.
+    let crossover = x["margins"]["crossover_hz"].as_f64().unwrap();
+    assert!((crossover - 3.5 / std::f64::consts::TAU).abs() < 1e-3, "{crossover}");
+    assert!((x["margins"]["ramp_lag_s"].as_f64().unwrap() - 1.0 / 3.5).abs() < 1e-9);
+    assert_eq!((&x["object"], &pressure["margins"]), (&Value::Null, &Value::Null));
+    let ball = r#"{ object = "ball", pressure = { vz = 10.0, resonance_hz = 2.4, damping_ratio = 0.35 } }"#;
+    let stiff = "pressure = { vz = 17.0, resonance_hz = 5.0, damping_ratio = 0.3 }";
+    let contacts = format!("facts.arm.contacts=[{ball}, {{ object = \"pen\", latency_ms = 20.0, {stiff} }}]");
+    let args = ["graphs/hybrid.toml", "--set", &contacts];
+    let both = loops(&args);
+    assert_eq!(both.len(), 6);
+    let phase = |one: &Value| one["margins"]["phase_deg"].as_f64().unwrap();
+    assert!(both.iter().all(|one| one["margins"]["is_stable"] == true && phase(one) > 20.0), "{both:?}");
+    // The stiffer contact and its latency cost margin, and of x the latency alone: 3.5 1/s times 20 ms.
+    assert!(phase(&both[2]) > phase(&both[5]));
+    assert!((phase(&both[0]) - phase(&both[3]) - (3.5 * 0.02_f64).to_degrees()).abs() < 0.1);
+    let page = say(&[&["explain"], &args[..]].concat()).out;
+    assert!(page.contains("The worst loop is that of `pressure` over `"), "{page}");
+}
+
+#[test]
+fn contacts_that_are_none_are_refused_with_an_example() {
+    let wrong = say(&["explain", "graphs/hybrid.toml", "--set", "facts.arm.contacts=[{ pressure = { vz = 1.0 } }]"]);
+    assert_eq!(wrong.code, 2);
+    assert!(wrong.err.contains("missing field `object`") && wrong.err.contains("for example"), "{}", wrong.err);
+}

@@ -92,6 +92,7 @@ mod together;
 mod tool;
 mod touch;
 mod udp_pad;
+mod tune;
 mod units;
 mod ur;
 mod ur_process;

@@ -7,11 +7,12 @@ use tactflow_tests::catalogue;
 
 use crate::course::get;
 
-const NODES: [&str; 12] = [
+const NODES: [&str; 13] = [
     "tactile_source",
     "binarize",
     "label",
     "select_region",
+    "image_window",
     "moments",
     "principal_axes",
     "eccentricity",
@@ -71,6 +72,11 @@ type = "moments"
 in.image = "calibrate.image"
 in.region = "nearest.region"
 weight = "area"
+[nodes.bend]
+type = "curvature"
+in.image = "calibrate.image"
+in.region = "image_window.region"
+min_anisotropy = 0.2
 [nodes.axis]
 type = "moving_average"
 in.value = "shape.orientation"
@@ -104,7 +110,13 @@ fn the_examples_load_together_and_no_touch_node_allocates_in_a_tick() {
     let mut engine = Engine::new(plan);
     let outputs = ["median.value", "low_pass.value", "moving_average.value", "axis.value", "middle.value", "cut.value"]
         .into_iter()
-        .chain(["contact_area.area", "contact_area.interpolated", "eccentricity.eccentricity", "principal_axes.minor"]);
+        .chain([
+            "contact_area.area",
+            "contact_area.interpolated",
+            "eccentricity.eccentricity",
+            "principal_axes.minor",
+            "bend.turn",
+        ]);
     let mut seen: Vec<(&str, u32)> = outputs.map(|name| (name, 0)).collect();
     let mut ticks = 0;
     while let Some(now) = engine.next() {

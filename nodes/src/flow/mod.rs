@@ -7,6 +7,7 @@ pub mod contact_debounce;
 pub mod delay;
 pub mod gate;
 pub mod logic;
+pub mod multisine;
 mod passing;
 pub mod probe;
 pub mod signal_generator;

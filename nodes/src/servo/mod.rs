@@ -2,16 +2,20 @@
 
 pub mod adjoint;
 pub mod compose_twist;
+pub mod deadband;
 pub mod edge_guard;
 pub mod feature_error;
 pub mod follow_path;
+pub mod gain_schedule;
 pub mod hold_pose;
 pub mod integral;
 pub mod inverse_jacobian;
+pub mod park;
 pub mod pid;
 pub mod placement;
 pub mod projector;
 pub mod ridge_guide;
 pub mod scan_guide;
+pub mod stiffness_estimate;
 pub mod twist_adder;
 pub mod twist_source;

@@ -2,6 +2,7 @@
 
 mod arguments;
 mod calibrate;
+mod control;
 mod doctor;
 mod explain;
 mod features;
@@ -14,6 +15,7 @@ mod press;
 #[cfg(feature = "drivers")]
 mod sniff;
 mod teach;
+mod tune;
 
 use tactflow_runtime::catalogue::Catalogue;
 use tactflow_runtime::cli::{Tool, derived};
@@ -28,7 +30,8 @@ pub fn tool(catalogue: Catalogue) -> Tool {
         .command(derived(new::run))
         .command(derived(pose::run))
         .command(derived(press::run))
-        .command(derived(teach::run));
+        .command(derived(teach::run))
+        .command(derived(tune::run));
     #[cfg(feature = "drivers")]
     let tool = tool.command(derived(pads::run)).command(derived(sniff::run));
     tool

@@ -3,16 +3,19 @@
 //! A pad's image passes [`tactile_source`] (the sensor's frame) → [`calibrate`] → [`binarize`] → [`label`] (finds the
 //! contact) → [`moments`] (its position, force and orientation) → [`moving_average`].
 //!
-//! Besides them, [`select_region`] selects one of several regions; [`hough`], [`eccentricity`], [`principal_axes`] and
-//! [`contact_area`] measure the shape of a region; [`low_pass`] and [`median`] are other filters.
+//! Besides them, [`select_region`] selects one of several regions, and [`image_window`] restricts one to a box;
+//! [`hough`], [`eccentricity`], [`principal_axes`], [`contact_area`] and [`curvature`] measure the shape of a region;
+//! [`low_pass`] and [`median`] are other filters.
 
 pub mod binarize;
 pub mod calibrate;
 mod common;
 pub mod contact_area;
+pub mod curvature;
 pub mod eccentricity;
 mod filter;
 pub mod hough;
+pub mod image_window;
 pub mod label;
 pub mod low_pass;
 pub mod median;

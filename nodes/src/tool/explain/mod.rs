@@ -1,27 +1,26 @@
 //! `tactflow explain`: what moves the arm in each mode, in numbers.
 
-mod chain;
-mod law;
 mod page;
-mod settings;
+mod stability;
 
 use std::path::PathBuf;
 
 use serde::Serialize;
 use tactflow_runtime::cli::clap::{self, ValueEnum};
 use tactflow_runtime::cli::{GraphArgs, Shell};
-use tactflow_runtime::graph::{Outline, compile};
+use tactflow_runtime::graph::{Compiled, compile};
 
-use chain::{Limiter, chain};
-use law::{Law, law};
-use settings::{Ends, Nodes};
+use super::control::chain::{Limiter, chain};
+use super::control::law::{Law, law};
+use super::control::settings::{self, Ends, Nodes};
+use stability::{Stability, stability};
 
 /// Print what moves the arm in each mode: gains, limits and delays
 #[derive(clap::Parser)]
 #[command(
     name = "explain",
     after_help = "It multiplies gains, columns and projectors, so each number of a table is the speed of a twist component for one unit of
-an error. It runs nothing.
+an error. For each contact that the bench declares, it computes the margins of the loops. It runs nothing.
 
 Examples:
   tactflow explain graphs/hybrid.toml
@@ -78,6 +77,8 @@ struct ModeLaw {
     mode: Option<String>,
     #[serde(flatten)]
     law: Law,
+    /// The loops of the features that are controlled, over each contact that the bench declares.
+    loops: Vec<Stability>,
     /// How the mode ends.
     ends: Ends,
 }
@@ -85,7 +86,7 @@ struct ModeLaw {
 pub(super) fn run(args: ExplainArgs, shell: &Shell) -> Result<u8, u8> {
     let request = args.graph_args.request(args.graph.clone());
     let compiled = compile(shell.catalogue(), &request).map_err(|report| shell.reject(&report))?;
-    let explained = explain(compiled.outline(), args.port.as_deref()).map_err(|message| shell.refuse(message))?;
+    let explained = explain(&compiled, args.port.as_deref()).map_err(|message| shell.refuse(message))?;
     match args.format {
         Format::Json => shell.say_json(&explained),
         Format::Text => shell.say(page::text(&args.graph, &explained).trim_end()),
@@ -94,7 +95,8 @@ pub(super) fn run(args: ExplainArgs, shell: &Shell) -> Result<u8, u8> {
     Ok(0)
 }
 
-fn explain(outline: &Outline, port: Option<&str>) -> Result<Explained, String> {
+fn explain(compiled: &Compiled, port: Option<&str>) -> Result<Explained, String> {
+    let outline = compiled.outline();
     let motions: Vec<(String, &str)> = match port {
         Some(port) => vec![(port.to_owned(), port)],
         None => settings::commands(outline).collect(),
@@ -102,20 +104,24 @@ fn explain(outline: &Outline, port: Option<&str>) -> Result<Explained, String> {
     if motions.is_empty() {
         return Err("no role is an arm, so nothing moves: name a port that carries a twist".into());
     }
-    let motions = motions.into_iter().map(|(of, port)| motion(outline, of, port));
+    let motions = motions.into_iter().map(|(of, port)| motion(compiled, of, port));
     Ok(Explained { period_s: outline.period_s, motions: motions.collect::<Result<_, _>>()? })
 }
 
-fn motion(outline: &Outline, of: String, port: &str) -> Result<Motion, String> {
+fn motion(compiled: &Compiled, of: String, port: &str) -> Result<Motion, String> {
+    let outline = compiled.outline();
     let (limits, twist) = chain(&Nodes::new(outline, None), port)?;
     let task = settings::task_of(outline, port);
     let modes = settings::modes(outline, task).map(|mode| {
         let nodes = Nodes::new(outline, mode);
-        ModeLaw {
+        let law = law(&nodes, &twist);
+        Ok(ModeLaw {
             mode: mode.map(|mode| mode.name.clone()),
-            law: law(&nodes, &twist),
+            loops: stability(compiled.facts(), &of, &law, outline.period_s)?,
+            law,
             ends: mode.map(settings::ends).unwrap_or_default(),
-        }
+        })
     });
-    Ok(Motion { of, limits, modes: modes.collect() })
+    let modes = modes.collect::<Result<_, String>>()?;
+    Ok(Motion { of, limits, modes })
 }

@@ -5,54 +5,70 @@ use std::path::Path;
 
 use tactflow_runtime::cli::table;
 
-use super::law::{COMPONENTS, Feature};
+use super::stability::Stability;
 use super::{Explained, ModeLaw, Motion};
+use crate::tool::control::law::{COMPONENTS, Feature};
 
 /// Columns of the table of features.
 const HEAD: [&str; 11] = ["feature", "setpoint", "vx", "vy", "vz", "wx", "wy", "wz", "kp, ki, kd", "delay", "measured"];
 
+/// Columns of the table of loops.
+const LOOP_HEAD: [&str; 9] =
+    ["contact", "loop", "crossover", "phase margin", "gain margin", "peak", "bandwidth", "ramp lag", "noise"];
+
+/// How a page is written.
+struct Style {
+    title: &'static str,
+    section: &'static str,
+    is_markdown: bool,
+}
+
+impl Style {
+    /// Writes a table whose first row is its head; from the column `right` on, up to `left`, it is aligned to the right.
+    fn table<const N: usize>(&self, rows: &[[String; N]], right: usize, left: usize) -> String {
+        if !self.is_markdown {
+            return table(rows, right, left);
+        }
+        let line = |row: &[String; N]| format!("| {} |\n", row.join(" | "));
+        let rule = format!("|{}\n", "---|".repeat(N));
+        let (head, body) = rows.split_at(1);
+        head.iter().map(line).chain([rule]).chain(body.iter().map(line)).collect()
+    }
+}
+
 pub(super) fn text(graph: &Path, explained: &Explained) -> String {
-    page(graph, explained, ["", ""], |rows| table(rows, 1, 8))
+    page(graph, explained, &Style { title: "", section: "", is_markdown: false })
 }
 
 pub(super) fn markdown(graph: &Path, explained: &Explained) -> String {
-    page(graph, explained, ["# ", "## "], |rows| {
-        let line = |row: &[String; 11]| format!("| {} |\n", row.join(" | "));
-        let rule = format!("|{}\n", "---|".repeat(11));
-        let (head, body) = rows.split_at(1);
-        head.iter().map(line).chain([rule]).chain(body.iter().map(line)).collect()
-    })
+    page(graph, explained, &Style { title: "# ", section: "## ", is_markdown: true })
 }
 
-fn page(
-    graph: &Path,
-    explained: &Explained,
-    [title, section]: [&str; 2],
-    table: impl Fn(&[[String; 11]]) -> String,
-) -> String {
+fn page(graph: &Path, explained: &Explained, style: &Style) -> String {
+    let Style { title, section, .. } = style;
     let mut text = format!("{title}{}: one tick every {} ms\n", graph.display(), number(1e3 * explained.period_s));
     for motion in &explained.motions {
         for mode in &motion.modes {
             let name = mode.mode.as_ref().map(|mode| format!(" in the mode `{mode}`")).unwrap_or_default();
             let _ = write!(text, "\n{section}`{}`{name}\n\n", motion.of);
-            text += &law(mode, &table);
+            text += &law(mode, style);
+            text += &loops(&mode.loops, style);
         }
         text += &limits(motion, section);
     }
     text
 }
 
-fn law(mode: &ModeLaw, table: &impl Fn(&[[String; 11]]) -> String) -> String {
+fn law(mode: &ModeLaw, style: &Style) -> String {
     let law = &mode.law;
     let mut text = String::new();
-    let moving = |feature: &&Feature| feature.column.iter().any(|entry| *entry != 0.0) && feature.has_gain();
-    let rows: Vec<[String; 11]> = law.features.iter().filter(moving).map(row).collect();
+    let rows: Vec<[String; 11]> = law.features.iter().filter(|one| one.moves()).map(row).collect();
     if !rows.is_empty() {
-        text += &table(&[&[HEAD.map(str::to_owned)], &rows[..]].concat());
+        text += &style.table(&[&[HEAD.map(str::to_owned)], &rows[..]].concat(), 1, 8);
         text += "Speeds in m/s and rad/s for an error of one unit (setpoint - measured), by kp.\n";
     }
     let off: Vec<String> =
-        law.features.iter().filter(|one| !moving(one)).map(|one| format!("`{}`", one.name)).collect();
+        law.features.iter().filter(|one| !one.moves()).map(|one| format!("`{}`", one.name)).collect();
     if !off.is_empty() {
         let _ = writeln!(text, "Not controlled: {}.", off.join(", "));
     }
@@ -103,6 +119,56 @@ fn limits(motion: &Motion, section: &str) -> String {
         let _ = writeln!(text, "{}. `{}` (`{}`){values}", i + 1, limiter.node, limiter.kind);
     }
     text
+}
+
+fn loops(loops: &[Stability], style: &Style) -> String {
+    let mut text = String::new();
+    let known: Vec<[String; 9]> = loops.iter().filter_map(margins).collect();
+    if !known.is_empty() {
+        text += "\n";
+        text += &style.table(&[&[LOOP_HEAD.map(str::to_owned)], &known[..]].concat(), 2, 9);
+        text += "The peak is that of the sensitivity, and the noise is the deviation of the feature for one of the measurement. Without\n\
+                 limits, dry friction, hysteresis, and what one feature does to another.\n";
+    }
+    let found = loops.iter().filter_map(|one| Some((one, one.margins.as_ref()?)));
+    let worst = found.max_by(|(_, a), (_, b)| {
+        (!a.is_stable, a.peak_sensitivity)
+            .partial_cmp(&(!b.is_stable, b.peak_sensitivity))
+            .unwrap_or(std::cmp::Ordering::Equal)
+    });
+    if let Some((one, margins)) = worst.filter(|_| known.len() > 1) {
+        let over = one.object.as_ref().map(|object| format!(" over `{object}`")).unwrap_or_default();
+        let how = if margins.is_stable { "the largest peak" } else { "it is not stable" };
+        let _ = writeln!(text, "The worst loop is that of `{}`{over}: {how}.", one.feature);
+    }
+    for one in loops.iter().filter(|one| one.margins.is_none()) {
+        let over = one.object.as_ref().map(|object| format!(" over `{object}`")).unwrap_or_default();
+        let _ = writeln!(
+            text,
+            "No margins of `{}`{over}: the bench does not say how it answers. `tactflow tune` measures it.",
+            one.feature
+        );
+    }
+    text
+}
+
+fn margins(one: &Stability) -> Option<[String; 9]> {
+    let margins = one.margins.as_ref()?;
+    let with = |value: Option<f64>, unit: &str, digits: usize| {
+        value.map_or_else(|| "none".to_owned(), |value| format!("{value:.digits$} {unit}"))
+    };
+    let stable = |text: String| if margins.is_stable { text } else { "unstable".to_owned() };
+    Some([
+        one.object.clone().unwrap_or_else(|| "(geometry)".into()),
+        one.feature.clone(),
+        with(margins.crossover_hz, "Hz", 2),
+        stable(with(margins.phase_deg, "deg", 0)),
+        with(margins.gain_db, "dB", 1),
+        stable(format!("{:.2}", margins.peak_sensitivity)),
+        stable(with(margins.bandwidth_hz, "Hz", 2)),
+        stable(with(Some(margins.ramp_lag_s * 1e3), "ms", 0)),
+        stable(format!("{:.3}", margins.noise)),
+    ])
 }
 
 /// Writes a number with at most six significant digits.

@@ -120,7 +120,7 @@ impl Shell {
     }
 
     /// Prints a line to standard error that is neither an error nor a warning.
-    pub(crate) fn say_beside(&self, text: &str) {
+    pub fn say_beside(&self, text: &str) {
         self.print_beside(format!("{text}\n"));
     }
 

@@ -6,19 +6,19 @@ use super::settings::{Nodes, source, toml};
 
 /// A node between the twist of a task and the command.
 #[derive(Debug, Serialize)]
-pub(super) struct Limiter {
-    pub(super) node: String,
+pub(crate) struct Limiter {
+    pub(crate) node: String,
     #[serde(rename = "type")]
-    pub(super) kind: String,
+    pub(crate) kind: String,
     /// Its parameters as they are written, without those that are not set.
-    pub(super) values: Vec<(String, String)>,
+    pub(crate) values: Vec<(String, String)>,
 }
 
 /// Types that make the twist of a task, where the way back ends.
 const MAKERS: [&str; 4] = ["twist_adder", "projector", "inverse_jacobian", "twist_source"];
 
 /// Returns the limiters before a port, the first one first, and the port of the twist before all of them.
-pub(super) fn chain(nodes: &Nodes<'_>, port: &str) -> Result<(Vec<Limiter>, String), String> {
+pub(crate) fn chain(nodes: &Nodes<'_>, port: &str) -> Result<(Vec<Limiter>, String), String> {
     let (mut limits, mut port) = (Vec::new(), port.to_owned());
     let writer = |port: &str| nodes.writer(port).ok_or_else(|| format!("no node writes `{port}`"));
     let mut node = writer(&port)?;

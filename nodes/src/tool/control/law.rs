@@ -4,66 +4,78 @@ use serde::Serialize;
 use tactflow_runtime::graph::OutlinedBlock;
 
 use super::settings::{Nodes, source};
+use super::shape::Shape;
 
 /// The components of a twist.
-pub(super) const COMPONENTS: [&str; 6] = ["vx", "vy", "vz", "wx", "wy", "wz"];
+pub(crate) const COMPONENTS: [&str; 6] = ["vx", "vy", "vz", "wx", "wy", "wz"];
 
 /// What a twist is made of.
 #[derive(Debug, Default, Serialize)]
-pub(super) struct Law {
-    pub(super) features: Vec<Feature>,
+pub(crate) struct Law {
+    pub(crate) features: Vec<Feature>,
     /// Constant motions.
-    pub(super) constants: Vec<Constant>,
+    pub(crate) constants: Vec<Constant>,
     /// Other nodes that move the arm, which this command does not know in numbers.
-    pub(super) guidance: Vec<Guidance>,
+    pub(crate) guidance: Vec<Guidance>,
 }
 
 /// A feature that is controlled.
 #[derive(Debug, Serialize)]
-pub(super) struct Feature {
-    pub(super) name: String,
+pub(crate) struct Feature {
+    pub(crate) name: String,
     /// Speed of each component for one unit of control, after the projectors.
-    pub(super) column: [f64; 6],
-    pub(super) kp: f64,
-    pub(super) ki: f64,
-    pub(super) kd: f64,
+    pub(crate) column: [f64; 6],
+    pub(crate) kp: f64,
+    pub(crate) ki: f64,
+    pub(crate) kd: f64,
     /// The port that is measured, before its filters.
-    pub(super) measured: Option<String>,
-    pub(super) setpoint: Option<f64>,
+    pub(crate) measured: Option<String>,
+    pub(crate) setpoint: Option<f64>,
+    /// The node that turns its control into a twist.
+    #[serde(skip)]
+    pub(crate) jacobian: String,
+    /// Its controller.
+    #[serde(skip)]
+    pub(crate) pid: Option<String>,
+    /// The port of its error.
+    #[serde(skip)]
+    pub(crate) error: Option<String>,
     /// Filters from the measurement to the error.
-    pub(super) filters: Vec<Filter>,
+    pub(crate) filters: Vec<Filter>,
 }
 
 /// A filter of a feature.
 #[derive(Debug, Serialize)]
-pub(super) struct Filter {
-    pub(super) node: String,
+pub(crate) struct Filter {
+    pub(crate) node: String,
     #[serde(rename = "type")]
-    pub(super) kind: String,
+    pub(crate) kind: String,
     /// Delay of a slow ramp [s].
-    pub(super) delay_s: f64,
+    pub(crate) delay_s: f64,
+    #[serde(skip)]
+    pub(crate) shape: Shape,
 }
 
 /// A constant twist, after the projectors.
 #[derive(Debug, Serialize)]
-pub(super) struct Constant {
-    pub(super) node: String,
-    pub(super) twist: [f64; 6],
+pub(crate) struct Constant {
+    pub(crate) node: String,
+    pub(crate) twist: [f64; 6],
 }
 
 /// A node that moves the arm by a law of its own.
 #[derive(Debug, Serialize)]
-pub(super) struct Guidance {
-    pub(super) port: String,
+pub(crate) struct Guidance {
+    pub(crate) port: String,
     #[serde(rename = "type")]
-    pub(super) kind: String,
+    pub(crate) kind: String,
     /// Components that the projectors behind it pass.
-    pub(super) passes: [bool; 6],
+    pub(crate) passes: [bool; 6],
 }
 
 impl Law {
     /// Returns whether anything moves a component.
-    pub(super) fn moves(&self, i: usize) -> bool {
+    pub(crate) fn moves(&self, i: usize) -> bool {
         self.features.iter().any(|feature| feature.column[i] != 0.0 && feature.has_gain())
             || self.constants.iter().any(|constant| constant.twist[i] != 0.0)
             || self.guidance.iter().any(|guidance| guidance.passes[i])
@@ -72,18 +84,23 @@ impl Law {
 
 impl Feature {
     /// Returns whether the feature has any gain.
-    pub(super) fn has_gain(&self) -> bool {
+    pub(crate) fn has_gain(&self) -> bool {
         [self.kp, self.ki, self.kd].iter().any(|gain| *gain != 0.0)
     }
 
+    /// Returns whether the feature moves anything.
+    pub(crate) fn moves(&self) -> bool {
+        self.has_gain() && self.column.iter().any(|entry| *entry != 0.0)
+    }
+
     /// Returns the delay of all filters [s].
-    pub(super) fn delay(&self) -> f64 {
+    pub(crate) fn delay(&self) -> f64 {
         self.filters.iter().map(|filter| filter.delay_s).sum()
     }
 }
 
 /// Returns what the twist of a port is made of.
-pub(super) fn law(nodes: &Nodes<'_>, port: &str) -> Law {
+pub(crate) fn law(nodes: &Nodes<'_>, port: &str) -> Law {
     let mut law = Law::default();
     collect(nodes, port, [true; 6], &mut law);
     law
@@ -135,36 +152,39 @@ fn feature(nodes: &Nodes<'_>, jacobian: &OutlinedBlock, name: String, column: [f
         None => (Vec::new(), None),
     };
     let [kp, ki, kd] = ["kp", "ki", "kd"].map(gain);
-    Feature { column, kp, ki, kd, measured, setpoint, filters, name }
+    let error = pid.and_then(|pid| source(pid, "error")).map(|port| format!("{port}.{name}"));
+    let pid = pid.map(|pid| pid.name.clone());
+    Feature { column, kp, ki, kd, measured, setpoint, filters, name, jacobian: jacobian.name.clone(), pid, error }
 }
 
 /// Returns the filters behind a port, the first one first, and the port before all of them.
 fn filters(nodes: &Nodes<'_>, port: &str) -> (Vec<Filter>, Option<String>) {
     let (mut filters, mut port) = (Vec::new(), port);
-    while let Some((node, delay_s, input)) =
-        nodes.writer(port).and_then(|node| Some((node, delay(nodes, node)?, source(node, "value")?)))
+    while let Some((node, shape, input)) =
+        nodes.writer(port).and_then(|node| Some((node, shape(nodes, node)?, source(node, "value")?)))
     {
-        filters.push(Filter { node: node.name.clone(), kind: node.kind.text.clone(), delay_s });
+        let delay_s = shape.delay(nodes.period());
+        filters.push(Filter { node: node.name.clone(), kind: node.kind.text.clone(), delay_s, shape });
         port = input;
     }
     filters.reverse();
     (filters, Some(port.to_owned()))
 }
 
-/// Returns the delay that a filter gives to a slow ramp [s]: the time constant of a low-pass, and half of a window. The
-/// median of a ramp is its middle too.
-fn delay(nodes: &Nodes<'_>, node: &OutlinedBlock) -> Option<f64> {
+/// Returns the filter that a node is.
+fn shape(nodes: &Nodes<'_>, node: &OutlinedBlock) -> Option<Shape> {
     let number = |path: &str| nodes.number(node, path);
-    let half = |window: f64| (window - 1.0) / 2.0 * nodes.period();
+    let samples = |usual: f64| match number("window_ms") {
+        Some(ms) => (ms * 1e-3 / nodes.period()).round().max(1.0),
+        None => number("window").unwrap_or(usual),
+    };
     match node.kind.text.as_str() {
         "low_pass" => number("time_constant_ms")
             .map(|ms| ms * 1e-3)
-            .or_else(|| number("cutoff_hz").map(|hz| 1.0 / (2.0 * std::f64::consts::PI * hz))),
-        "moving_average" => match number("window_ms") {
-            Some(ms) => Some(ms * 1e-3 / 2.0),
-            None => Some(half(number("window").unwrap_or(10.0))),
-        },
-        "median" => Some(half(number("window").unwrap_or(5.0))),
+            .or_else(|| number("cutoff_hz").map(|hz| 1.0 / (2.0 * std::f64::consts::PI * hz)))
+            .map(|time| Shape::LowPass { time }),
+        "moving_average" => Some(Shape::Mean { samples: samples(10.0) }),
+        "median" => Some(Shape::Median { samples: samples(5.0) }),
         _ => None,
     }
 }

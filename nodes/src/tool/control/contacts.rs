@@ -1,0 +1,163 @@
+//! The contacts that a bench declares: how features answer the motion of the sensor.
+
+use std::collections::BTreeMap;
+
+use serde::{Deserialize, Serialize};
+
+/// What the arm touches: one entry of `contacts` in `[facts.ARM]`.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub(crate) struct Contact {
+    /// Name of the object, for messages.
+    pub(crate) object: String,
+    /// Time from a command to the image that shows its effect, without the period of the graph and without filters
+    /// [ms].
+    #[serde(default)]
+    pub(crate) latency_ms: f64,
+    /// The features, by the name of the port that measures them.
+    #[serde(flatten)]
+    pub(crate) features: BTreeMap<String, Answer>,
+}
+
+/// How one feature answers the commanded motion of the sensor.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub(crate) struct Answer {
+    /// Change of the feature for each metre along x, y and z of the sensor.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(crate) vx: Option<f64>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(crate) vy: Option<f64>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(crate) vz: Option<f64>,
+    /// Change of the feature for each radian about x, y and z of the sensor.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(crate) wx: Option<f64>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(crate) wy: Option<f64>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(crate) wz: Option<f64>,
+    /// Resonance of arm and contact along this motion [Hz]; a rigid arm has none.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(crate) resonance_hz: Option<f64>,
+    /// Damping of the resonance, as a fraction of the critical one [1].
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(crate) damping_ratio: Option<f64>,
+    /// Latency of this feature, instead of that of the contact [ms].
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(crate) latency_ms: Option<f64>,
+}
+
+/// Damping of a resonance that a bench states without one: that of the paper's arm [1].
+const USUAL_DAMPING: f64 = 0.2;
+
+impl Answer {
+    /// Returns what geometry alone says of a feature: a place moves against the sensor, and so does an angle about its
+    /// normal. `None` if the object decides.
+    pub(crate) fn of_geometry(feature: &str) -> Option<Self> {
+        match feature {
+            "x" => Some(Self { vx: Some(-1.0), ..Self::default() }),
+            "y" => Some(Self { vy: Some(-1.0), ..Self::default() }),
+            "orientation" | "angle" => Some(Self { wz: Some(-1.0), ..Self::default() }),
+            _ => None,
+        }
+    }
+
+    /// Returns the change of the feature for each unit of a twist.
+    pub(crate) fn row(&self) -> [f64; 6] {
+        [self.vx, self.vy, self.vz, self.wx, self.wy, self.wz].map(Option::unwrap_or_default)
+    }
+
+    /// Returns the circular frequency [rad/s] and the damping ratio of the resonance.
+    pub(crate) fn resonance(&self) -> Option<(f64, f64)> {
+        let damping = self.damping_ratio.unwrap_or(USUAL_DAMPING);
+        self.resonance_hz.map(|hz| (2.0 * std::f64::consts::PI * hz, damping))
+    }
+
+    fn check(&self, feature: &str) -> Result<(), String> {
+        let positive = [("resonance_hz", self.resonance_hz), ("damping_ratio", self.damping_ratio)];
+        let bad =
+            positive.into_iter().find(|(_, value)| value.is_some_and(|value| !(value > 0.0 && value.is_finite())));
+        match bad {
+            Some((key, Some(value))) => {
+                Err(format!("`{key}` of `{feature}` is {value}: write a number greater than 0"))
+            }
+            _ if self.row().iter().any(|entry| !entry.is_finite()) => Err(format!("`{feature}` has no finite answer")),
+            _ => Ok(()),
+        }
+    }
+}
+
+impl Contact {
+    /// Returns how a feature answers: as the bench says, or else by geometry.
+    pub(crate) fn answer(&self, feature: &str) -> Option<Answer> {
+        self.features.get(feature).copied().or_else(|| Answer::of_geometry(feature))
+    }
+
+    fn check(&self) -> Result<(), String> {
+        if !(self.latency_ms >= 0.0 && self.latency_ms.is_finite()) {
+            return Err(format!("`latency_ms` is {} ms: write 0 or more", self.latency_ms));
+        }
+        self.features.iter().try_for_each(|(feature, answer)| answer.check(feature))
+    }
+}
+
+/// Returns the contacts that the bench of a graph declares for an arm.
+///
+/// # Errors
+/// If the fact has another form.
+pub(crate) fn contacts(facts: &[(String, toml::Value)], arm: &str) -> Result<Vec<Contact>, String> {
+    let name = format!("{arm}.contacts");
+    let Some((_, value)) = facts.iter().find(|(fact, _)| *fact == name) else { return Ok(Vec::new()) };
+    let wrong = |why: String| {
+        let example =
+            r#"contacts = [{ object = "ball", pressure = { vz = 12.0, resonance_hz = 5.0, damping_ratio = 0.2 } }]"#;
+        format!("`contacts` in `[facts.{arm}]` of the bench: {why}\nwrite, for example, `{example}`")
+    };
+    let contacts: Vec<Contact> = value.clone().try_into().map_err(|error: toml::de::Error| wrong(error.to_string()))?;
+    for contact in &contacts {
+        contact.check().map_err(|why| wrong(format!("{}: {why}", contact.object)))?;
+    }
+    Ok(contacts)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn read(text: &str) -> Result<Vec<Contact>, String> {
+        let table: toml::Table = toml::from_str(text).unwrap();
+        contacts(&[("arm.contacts".into(), table["contacts"].clone())], "arm")
+    }
+
+    #[test]
+    fn a_contact_states_what_geometry_does_not() {
+        let read =
+            read(r#"contacts = [{ object = "ball", latency_ms = 4, pressure = { vz = 12.0, resonance_hz = 5.0 } }]"#);
+        let ball = &read.unwrap()[0];
+        assert_eq!(ball.answer("pressure").unwrap().row(), [0.0, 0.0, 12.0, 0.0, 0.0, 0.0]);
+        let (circular, damping) = ball.answer("pressure").unwrap().resonance().unwrap();
+        assert!((circular - 31.4159).abs() < 1e-3 && damping == 0.2);
+        assert_eq!(ball.answer("y").unwrap().row(), [0.0, -1.0, 0.0, 0.0, 0.0, 0.0]);
+        assert_eq!(ball.answer("force"), None);
+        assert_eq!(contacts(&[], "arm"), Ok(Vec::new()));
+    }
+
+    #[test]
+    fn what_is_no_contact_is_refused_with_an_example_that_works() {
+        for (text, why) in [
+            ("contacts = 3", "invalid type"),
+            (r#"contacts = [{ object = "ball", pressure = { vz = 1.0, mass = 2.0 } }]"#, "unknown field `mass`"),
+            (
+                r#"contacts = [{ object = "ball", pressure = { vz = 1.0, resonance_hz = 0.0 } }]"#,
+                "`resonance_hz` of `pressure` is 0",
+            ),
+            (r#"contacts = [{ object = "ball", latency_ms = -1.0 }]"#, "`latency_ms` is -1"),
+            (r#"contacts = [{ object = "ball", pressure = { vz = nan } }]"#, "no finite answer"),
+        ] {
+            let message = read(text).unwrap_err();
+            assert!(message.contains(why), "{text}: {message}");
+            let example = message.rsplit_once("for example, `").unwrap().1.trim_end_matches('`');
+            assert!(read(example).is_ok(), "{example}");
+        }
+    }
+}

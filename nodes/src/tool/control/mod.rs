@@ -1,0 +1,12 @@
+//! The control law of a graph in numbers: what moves an arm, and how stable its loops are.
+//!
+//! [`law`] multiplies gains, columns and projectors. [`response`] follows one feature around its loop, with the
+//! [`contacts`] that a bench declares, and [`margins`] says how far the loop is from instability.
+
+pub(super) mod chain;
+pub(super) mod contacts;
+pub(super) mod law;
+pub(super) mod margins;
+pub(super) mod response;
+pub(super) mod settings;
+pub(super) mod shape;

@@ -1,0 +1,180 @@
+//! The frequency response of a loop: from the error of a feature around to the measured feature.
+//!
+//! ```text
+//! L(s) = K(s) · J c · hold(s) / s · A(s) · exp(-s latency) · F(s)
+//! ```
+//!
+//! K is the `pid`, c the column behind all projectors, J the answer of the feature to the motion of the sensor, A the
+//! resonance of arm and contact, and F the filters. A command is held for one period. K and F are those of sampled
+//! signals, at z = exp(s T). Not in it: limits, dry friction, hysteresis, and what one feature does to another.
+
+use nalgebra::Complex;
+
+use super::contacts::{Answer, Contact};
+use super::law::Feature;
+use super::shape::{Shape, turn};
+
+/// The loop of one feature over one contact.
+#[derive(Debug, Clone)]
+pub(crate) struct Loop {
+    kp: f64,
+    ki: f64,
+    kd: f64,
+    shapes: Vec<Shape>,
+    /// Change of the feature for each unit of the control, over time.
+    pub(crate) gain: f64,
+    resonance: Option<(f64, f64)>,
+    latency: f64,
+    pub(crate) period: f64,
+}
+
+impl Loop {
+    /// Returns the loop of a feature over a contact; `None` if neither the bench nor geometry says how the feature
+    /// answers the motion of its column.
+    pub(crate) fn over(feature: &Feature, contact: &Contact, period: f64) -> Option<Self> {
+        let quantity = feature.measured.as_ref()?.rsplit('.').next()?;
+        let answer = contact.answer(quantity)?;
+        let latency_ms = answer.latency_ms.unwrap_or(contact.latency_ms);
+        let around = Self::new(feature, &answer, latency_ms * 1e-3, period);
+        (around.gain != 0.0).then_some(around)
+    }
+
+    /// Returns the loop of a feature, with the latency and the period [s].
+    pub(crate) fn new(feature: &Feature, answer: &Answer, latency: f64, period: f64) -> Self {
+        let gain = answer.row().iter().zip(feature.column).map(|(answer, column)| answer * column).sum();
+        let Feature { kp, ki, kd, .. } = *feature;
+        let shapes = feature.filters.iter().map(|filter| filter.shape).collect();
+        Self { kp, ki, kd, shapes, gain, resonance: answer.resonance(), latency, period }
+    }
+
+    /// Returns the same loop with all gains of the controller times a factor.
+    pub(crate) fn times(&self, factor: f64) -> Self {
+        let [kp, ki, kd] = [self.kp, self.ki, self.kd].map(|gain| gain * factor);
+        Self { kp, ki, kd, ..self.clone() }
+    }
+
+    /// Returns the number of poles at zero: the motion integrates, and so does `ki`.
+    pub(crate) fn integrators(&self) -> usize {
+        if self.ki == 0.0 { 1 } else { 2 }
+    }
+
+    /// Returns the proportional gain around the loop [rad/s].
+    pub(crate) fn proportional(&self) -> f64 {
+        self.kp * self.gain
+    }
+
+    /// Returns whether the motion increases the error.
+    pub(crate) fn is_reversed(&self) -> bool {
+        [self.kp, self.ki, self.kd].iter().any(|gain| gain * self.gain < 0.0)
+    }
+
+    /// Returns how long the error of a steady ramp is ahead [s]: the lag of `kp` without an integral, and all delays.
+    pub(crate) fn ramp_lag(&self) -> f64 {
+        let lag = if self.ki == 0.0 { 1.0 / self.proportional() } else { 0.0 };
+        lag + self.latency + self.shapes.iter().map(|shape| shape.delay(self.period)).sum::<f64>()
+    }
+
+    /// Returns L at a circular frequency [rad/s].
+    pub(crate) fn open(&self, omega: f64) -> Complex<f64> {
+        self.known(omega) * arm(omega, self.resonance) * turn(omega * self.latency) * self.gain
+    }
+
+    /// Returns the response of controller, travel and filters, which a graph states.
+    pub(crate) fn known(&self, omega: f64) -> Complex<f64> {
+        let filters: Complex<f64> = self.shapes.iter().map(|shape| shape.response(omega, self.period)).product();
+        self.control(omega) * filters * travel(omega, self.period)
+    }
+
+    fn control(&self, omega: f64) -> Complex<f64> {
+        let change = Complex::from(1.0) - turn(omega * self.period);
+        let integral = if self.ki == 0.0 { Complex::from(0.0) } else { Complex::from(self.ki * self.period) / change };
+        Complex::from(self.kp) + integral + change * (self.kd / self.period)
+    }
+}
+
+/// Returns the response of motion to a speed that is held for a period [s].
+fn travel(omega: f64, period: f64) -> Complex<f64> {
+    let s = Complex::new(0.0, omega);
+    (Complex::from(1.0) - turn(omega * period)) / (s * s * period)
+}
+
+/// Returns the response of a resonance with its circular frequency [rad/s] and damping ratio.
+pub(crate) fn arm(omega: f64, resonance: Option<(f64, f64)>) -> Complex<f64> {
+    let Some((own, damping)) = resonance else { return Complex::from(1.0) };
+    let ratio = omega / own;
+    Complex::from(1.0) / Complex::new(1.0 - ratio * ratio, 2.0 * damping * ratio)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::law::Filter;
+    use super::*;
+
+    /// Number of steps of the arm in a period.
+    const STEPS: usize = 40;
+
+    /// Runs the loop in time, with the arm in small steps, and returns the response of the filtered feature to an error
+    /// with a period of so many samples.
+    fn in_time(samples: usize) -> Complex<f64> {
+        let (period, own, damping) = (0.004, 30.0, 0.3);
+        let angle = |tick: usize| 2.0 * std::f64::consts::PI * (tick % samples) as f64 / samples as f64;
+        let share = -libm::expm1(-period / 0.1_f64);
+        let (mut window, mut low, mut integral, mut last) = ([0.0; 10], 0.0, 0.0, 0.0);
+        let (mut want, mut place, mut speed) = (0.0, 0.0, 0.0);
+        let settled = 5000_usize.div_ceil(samples) * samples;
+        let mut measured = Vec::new();
+        for tick in 0..settled + 2 * samples {
+            window.rotate_right(1);
+            window[0] = 7.0 * place;
+            low += share * (window.iter().sum::<f64>() / 10.0 - low);
+            measured.push(low);
+            let error = libm::sin(angle(tick));
+            integral += 0.4 * error * period;
+            let control = 0.5 * error + integral + 0.02 * (error - last) / period;
+            last = error;
+            for _ in 0..STEPS {
+                let dt = period / STEPS as f64;
+                want += control * dt;
+                speed += (own * own * (want - place) - 2.0 * damping * own * speed) * dt;
+                place += speed * dt;
+            }
+        }
+        // The integral of a sine has a mean, so the place has a steady drift, which is taken out.
+        let (before, after) = measured[settled..].split_at(samples);
+        let drift = (after[0] - before[0]) / samples as f64;
+        let sum = |(tick, value): (usize, &f64)| turn(angle(tick)) * (value - drift * tick as f64);
+        // For an error sin, and not cos.
+        after.iter().enumerate().map(sum).sum::<Complex<f64>>() * Complex::new(0.0, 2.0 / samples as f64)
+    }
+
+    #[test]
+    fn the_response_is_that_of_the_loop_in_time() {
+        let answer = Answer {
+            vz: Some(7.0),
+            resonance_hz: Some(30.0 / (2.0 * std::f64::consts::PI)),
+            damping_ratio: Some(0.3),
+            ..Answer::default()
+        };
+        let filter = |shape: Shape| Filter { node: String::new(), kind: String::new(), delay_s: 0.0, shape };
+        let feature = Feature {
+            name: "pressure".into(),
+            column: [0.0, 0.0, 1.0, 0.0, 0.0, 0.0],
+            kp: 0.5,
+            ki: 0.4,
+            kd: 0.02,
+            measured: None,
+            setpoint: None,
+            jacobian: String::new(),
+            pid: None,
+            error: None,
+            filters: [Shape::Mean { samples: 10.0 }, Shape::LowPass { time: 0.1 }].map(filter).into(),
+        };
+        let around = Loop::new(&feature, &answer, 0.0, 0.004);
+        for samples in [400, 200, 100, 50, 20] {
+            let omega = 2.0 * std::f64::consts::PI / (0.004 * samples as f64);
+            let (open, ran) = (around.open(omega), in_time(samples));
+            let ratio = ran / open;
+            assert!((ratio.norm() - 1.0).abs() < 0.02 && ratio.arg().abs() < 0.02, "{omega}: {open} and {ran}");
+        }
+    }
+}

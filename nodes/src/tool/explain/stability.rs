@@ -1,0 +1,43 @@
+//! The margins of the loops of one mode.
+
+use std::collections::BTreeMap;
+
+use serde::Serialize;
+
+use crate::tool::control::contacts::{Contact, contacts};
+use crate::tool::control::law::{Feature, Law};
+use crate::tool::control::margins::{Margins, margins};
+use crate::tool::control::response::Loop;
+
+/// The loop of a feature over one contact.
+#[derive(Debug, Serialize)]
+pub(super) struct Stability {
+    /// The object that is touched; `None` where the bench declares no contact, and geometry alone says the response.
+    pub(super) object: Option<String>,
+    pub(super) feature: String,
+    /// `None` if nothing says how the feature answers.
+    pub(super) margins: Option<Margins>,
+}
+
+/// Returns the margins of all features that a law controls, with the contacts that the bench declares for the arm of a
+/// command.
+pub(super) fn stability(
+    facts: &[(String, toml::Value)],
+    command: &str,
+    law: &Law,
+    period: f64,
+) -> Result<Vec<Stability>, String> {
+    let arm = command.split('.').next().unwrap_or_default();
+    let declared = contacts(facts, arm)?;
+    let alone = [Contact { object: String::new(), latency_ms: 0.0, features: BTreeMap::new() }];
+    let declared = if declared.is_empty() { &alone[..] } else { &declared[..] };
+    let controlled: Vec<&Feature> = law.features.iter().filter(|feature| feature.moves()).collect();
+    let loops = declared.iter().flat_map(|contact| {
+        controlled.iter().map(|feature| Stability {
+            object: Some(contact.object.clone()).filter(|object| !object.is_empty()),
+            feature: feature.name.clone(),
+            margins: Loop::over(feature, contact, period).map(|around| margins(&around)),
+        })
+    });
+    Ok(loops.collect())
+}

@@ -1,0 +1,119 @@
+//! The largest gains that keep their margins over all contacts.
+
+use serde::Serialize;
+
+use crate::tool::control::margins::{Margins, margins};
+use crate::tool::control::response::Loop;
+
+/// What a loop must keep in the worst case.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub(super) struct Wanted {
+    /// Largest peak of the sensitivity [1].
+    pub(super) peak: f64,
+    /// Smallest gain margin [dB].
+    pub(super) gain_db: f64,
+    /// Smallest phase margin [deg].
+    pub(super) phase_deg: f64,
+}
+
+impl Default for Wanted {
+    fn default() -> Self {
+        Self { peak: 1.7, gain_db: 9.0, phase_deg: 50.0 }
+    }
+}
+
+impl Wanted {
+    /// Returns whether a loop keeps them.
+    pub(super) fn holds(self, found: &Margins) -> bool {
+        found.is_stable
+            && found.peak_sensitivity <= self.peak
+            && found.gain_db.is_none_or(|db| db >= self.gain_db)
+            && found.phase_deg.is_none_or(|deg| deg >= self.phase_deg)
+    }
+}
+
+/// Ratio of two neighbouring gains that are tried, before the last ones are halved.
+const STEP: f64 = 1.1;
+/// Gain around a loop in one period above which nothing is tried [1].
+const MAX_SHARE: f64 = 0.5;
+
+/// Returns the largest factor on all gains of a feature up to which each of its loops keeps the margins; `None` if there
+/// is none. With an integral, the margins do not hold for very small gains.
+pub(super) fn factor(loops: &[Loop], wanted: Wanted) -> Option<f64> {
+    let share = |around: &Loop, factor: f64| around.proportional().abs() * around.period * factor;
+    let is_tried = |factor: f64| loops.iter().all(|around| share(around, factor) < MAX_SHARE);
+    let holds =
+        |factor: f64| is_tried(factor) && loops.iter().all(|around| wanted.holds(&margins(&around.times(factor))));
+    // From a crossover that is far below the rate of the graph.
+    let mut low = loops.iter().map(|around| 1e-4 / share(around, 1.0)).reduce(f64::min)?;
+    while !holds(low) {
+        low *= STEP;
+        if !is_tried(low) {
+            return None;
+        }
+    }
+    while holds(low * STEP) {
+        low *= STEP;
+    }
+    let mut high = low * STEP;
+    for _ in 0..5 {
+        let middle = (low * high).sqrt();
+        if holds(middle) { low = middle } else { high = middle }
+    }
+    Some(low)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::tool::control::contacts::Answer;
+    use crate::tool::control::law::Feature;
+
+    fn around(gain: f64, delay: f64) -> Loop {
+        with_integral(gain, delay, 0.0)
+    }
+
+    fn with_integral(gain: f64, delay: f64, ki: f64) -> Loop {
+        let feature = Feature {
+            name: "pressure".into(),
+            column: [0.0, 0.0, 1.0, 0.0, 0.0, 0.0],
+            kp: 1.0,
+            ki,
+            kd: 0.0,
+            measured: None,
+            setpoint: None,
+            jacobian: String::new(),
+            pid: None,
+            error: None,
+            filters: Vec::new(),
+        };
+        Loop::new(&feature, &Answer { vz: Some(gain), ..Answer::default() }, delay, 1e-4)
+    }
+
+    #[test]
+    fn the_gain_is_that_of_the_closed_form_and_the_worst_contact_decides() {
+        // With a delay, the phase is 90 deg - kp g delay, and the gain margin pi / (2 kp g delay).
+        let wanted = Wanted { peak: 9.0, gain_db: 0.0, phase_deg: 50.0 };
+        let found = factor(&[around(2.0, 0.05)], wanted).unwrap();
+        let exact = 40.0_f64.to_radians() / (2.0 * 0.05);
+        assert!((found / exact - 1.0).abs() < 0.03, "{found} and {exact}");
+        let both = factor(&[around(2.0, 0.05), around(6.0, 0.05)], wanted).unwrap();
+        assert!((both / (exact / 3.0) - 1.0).abs() < 0.03, "{both}");
+        let wanted = Wanted { peak: 9.0, gain_db: 9.0, phase_deg: 0.0 };
+        let found = factor(&[around(2.0, 0.05)], wanted).unwrap();
+        let exact = std::f64::consts::PI / (2.0 * 2.0 * 0.05) / 10.0_f64.powf(9.0 / 20.0);
+        assert!((found / exact - 1.0).abs() < 0.03, "{found} and {exact}");
+    }
+
+    #[test]
+    fn an_integral_does_not_hide_the_gains_that_hold() {
+        let (with, without) = (with_integral(2.0, 0.05, 0.2), around(2.0, 0.05));
+        let [with, without] = [with, without].map(|one| factor(&[one], Wanted::default()).unwrap());
+        assert!(with < without && with > 0.8 * without, "{with} and {without}");
+    }
+
+    #[test]
+    fn a_reversed_loop_has_no_gain() {
+        assert_eq!(factor(&[around(-2.0, 0.05)], Wanted::default()), None);
+    }
+}

@@ -1,0 +1,194 @@
+//! A gain, a resonance and a latency that explain a measured response.
+
+use nalgebra::Complex;
+use serde::Serialize;
+
+use super::experiment::Line;
+use crate::tool::control::response::arm;
+use crate::tool::control::shape::turn;
+
+/// How a feature answers one component of the motion.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub(super) struct Fit {
+    /// Change of the feature for each metre or radian.
+    pub(super) gain: f64,
+    /// Resonance [Hz] and damping ratio; `None` where the answer has none up to the highest frequency.
+    pub(super) resonance: Option<(f64, f64)>,
+    /// Latency [s].
+    pub(super) latency: f64,
+    /// Root mean square of what the fit does not explain, relative to the response [1].
+    pub(super) residual: f64,
+    /// Number of frequencies that are explained.
+    pub(super) frequencies: usize,
+}
+
+/// Smallest coherence of a frequency that counts.
+pub(super) const COHERENT: f64 = 0.8;
+/// Smallest number of frequencies that tell a resonance from a delay.
+pub(super) const ENOUGH: usize = 5;
+
+/// Smallest resonance that is tried [rad/s].
+const MIN_RESONANCE: f64 = 2.0;
+/// Smallest damping ratio of an arm in contact: a sharper peak between two frequencies is a mistake of the fit [1].
+const MIN_DAMPING: f64 = 0.05;
+
+/// The answer at one frequency: circular frequency [rad/s], response and weight.
+type Point = (f64, Complex<f64>, f64);
+
+/// Fits the answers at all coherent frequencies. `known` is the response of controller, filters and travel, with the
+/// column. Returns the number of coherent frequencies if they are too few.
+pub(super) fn fit(lines: &[Line], known: impl Fn(f64) -> Complex<f64>) -> Result<Fit, usize> {
+    let good = lines.iter().filter(|line| line.coherence >= COHERENT);
+    let points: Vec<Point> = good.map(|line| (line.omega, line.open / known(line.omega), line.coherence)).collect();
+    if points.len() < ENOUGH {
+        return Err(points.len());
+    }
+    let top = points.last().map_or(1.0, |point| point.0);
+    let mut best = search(
+        &points,
+        [Span::log(MIN_RESONANCE, 2.0 * top, 24), Span::log(MIN_DAMPING, 1.5, 10), Span::new(0.0, 0.08, 9)],
+    );
+    for _ in 0..8 {
+        let mut near = best.spans.map(|span| span.closer(9));
+        near[1].low = near[1].low.max(MIN_DAMPING);
+        best = search(&points, near);
+    }
+    let plain = search(&points, [Span::log(1e4, 1e4, 1), Span::log(1.0, 1.0, 1), Span::new(0.0, 0.12, 121)]);
+    // A resonance that hardly explains more, or that lies above all frequencies, is none.
+    let has_resonance = best.error < 0.8 * plain.error && best.at[0] < 1.5 * top;
+    let chosen = if has_resonance { &best } else { &plain };
+    let [own, damping, latency] = chosen.at;
+    Ok(Fit {
+        gain: chosen.gain,
+        resonance: has_resonance.then_some((own / (2.0 * std::f64::consts::PI), damping)),
+        latency,
+        residual: chosen.error,
+        frequencies: points.len(),
+    })
+}
+
+/// The values of a parameter that are tried.
+#[derive(Debug, Clone, Copy)]
+struct Span {
+    low: f64,
+    high: f64,
+    steps: usize,
+    is_log: bool,
+    /// The best of them.
+    at: f64,
+}
+
+impl Span {
+    const fn new(low: f64, high: f64, steps: usize) -> Self {
+        Self { low, high, steps, is_log: false, at: low }
+    }
+
+    const fn log(low: f64, high: f64, steps: usize) -> Self {
+        Self { low, high, steps, is_log: true, at: low }
+    }
+
+    fn values(self) -> impl Iterator<Item = f64> {
+        let share = move |i: usize| if self.steps > 1 { i as f64 / (self.steps - 1) as f64 } else { 0.0 };
+        (0..self.steps).map(move |i| match self.is_log {
+            true => self.low * libm::pow(self.high / self.low, share(i)),
+            false => self.low + (self.high - self.low) * share(i),
+        })
+    }
+
+    /// Returns a third of the span around its best value.
+    fn closer(self, steps: usize) -> Self {
+        match self.is_log {
+            true => {
+                let reach = libm::pow(self.high / self.low, 1.0 / 6.0);
+                Self { low: self.at / reach, high: self.at * reach, steps, ..self }
+            }
+            false => {
+                let reach = (self.high - self.low) / 6.0;
+                Self { low: (self.at - reach).max(0.0), high: self.at + reach, steps, ..self }
+            }
+        }
+    }
+}
+
+struct Best {
+    spans: [Span; 3],
+    at: [f64; 3],
+    gain: f64,
+    error: f64,
+}
+
+/// Tries all combinations of resonance, damping and latency. The gain of each is in closed form.
+fn search(points: &[Point], spans: [Span; 3]) -> Best {
+    let mut best = Best { spans, at: spans.map(|span| span.low), gain: 0.0, error: f64::INFINITY };
+    for own in spans[0].values() {
+        for damping in spans[1].values() {
+            for latency in spans[2].values() {
+                let model = |omega: f64| arm(omega, Some((own, damping))) * turn(omega * latency);
+                let (gain, error) = gain(points, model);
+                if error < best.error {
+                    best = Best { at: [own, damping, latency], gain, error, ..best };
+                }
+            }
+        }
+    }
+    best.spans.iter_mut().zip(best.at).for_each(|(span, at)| span.at = at);
+    best
+}
+
+/// Returns the real gain that explains the points best, each relative to itself, and what is left.
+fn gain(points: &[Point], model: impl Fn(f64) -> Complex<f64>) -> (f64, f64) {
+    let (mut product, mut square, mut whole) = (0.0, 0.0, 0.0);
+    let pairs: Vec<_> = points.iter().map(|(omega, response, weight)| (model(*omega) / response, weight)).collect();
+    for (ratio, weight) in &pairs {
+        product += *weight * ratio.re;
+        square += *weight * ratio.norm_sqr();
+        whole += **weight;
+    }
+    let gain = product / square;
+    let left: f64 = pairs.iter().map(|(ratio, weight)| *weight * (ratio * gain - Complex::from(1.0)).norm_sqr()).sum();
+    (gain, (left / whole).sqrt())
+}
+
+#[cfg(test)]
+mod tests {
+    use tactflow_runtime::random::Random;
+
+    use super::*;
+
+    fn lines(gain: f64, resonance: Option<(f64, f64)>, latency: f64, noise: f64) -> Vec<Line> {
+        let mut random = Random::new(7, 0);
+        let omegas = (1..=32).map(|i| 2.0 * std::f64::consts::PI * 0.25 * f64::from(i));
+        let mut line = |omega: f64| {
+            let ideal = arm(omega, resonance) * turn(omega * latency) * gain;
+            let noisy = Complex::new(random.normal(), random.normal()) * noise * ideal.norm();
+            Line { omega, open: ideal + noisy, coherence: 0.99 }
+        };
+        omegas.map(&mut line).collect()
+    }
+
+    #[test]
+    fn what_made_the_response_is_found_again() {
+        for (gain, hz, damping, latency) in [(12.0, 5.0, 0.2, 0.008), (-3.0, 2.4, 0.35, 0.02), (0.4, 6.5, 0.6, 0.0)] {
+            let circular = 2.0 * std::f64::consts::PI * hz;
+            let found = fit(&lines(gain, Some((circular, damping)), latency, 0.03), |_| Complex::from(1.0)).unwrap();
+            let (own, ratio) = found.resonance.unwrap();
+            assert!((found.gain / gain - 1.0).abs() < 0.05, "{found:?}");
+            assert!((own / hz - 1.0).abs() < 0.03 && (ratio / damping - 1.0).abs() < 0.12, "{found:?}");
+            assert!((found.latency - latency).abs() < 0.003, "{found:?}");
+        }
+    }
+
+    #[test]
+    fn a_rigid_arm_has_no_resonance() {
+        let found = fit(&lines(2.0, None, 0.03, 0.02), |_| Complex::from(1.0)).unwrap();
+        assert_eq!(found.resonance, None);
+        assert!((found.gain - 2.0).abs() < 0.05 && (found.latency - 0.03).abs() < 0.002, "{found:?}");
+    }
+
+    #[test]
+    fn noise_without_coherence_is_no_answer() {
+        let mut lines = lines(2.0, None, 0.0, 0.0);
+        lines.iter_mut().skip(5).for_each(|line| line.coherence = 0.5);
+        assert_eq!(fit(&lines, |_| Complex::from(1.0)), Err(5));
+    }
+}

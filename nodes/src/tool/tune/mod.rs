@@ -1,0 +1,397 @@
+//! `tactflow tune`: measures how the features answer, and proposes gains with margins.
+
+mod choose;
+mod experiment;
+mod fit;
+mod page;
+mod save;
+mod trial;
+
+use std::collections::BTreeMap;
+use std::path::PathBuf;
+
+use serde::Serialize;
+use tactflow_runtime::cli::clap::{self, ValueEnum};
+use tactflow_runtime::cli::{GraphArgs, Shell};
+use tactflow_runtime::graph::{Compiled, Outline, OutlinedMode, Request, compile};
+
+use super::control::chain::chain;
+use super::control::contacts::{Answer, Contact};
+use super::control::law::{Feature, law};
+use super::control::margins::{Margins, margins};
+use super::control::response::Loop;
+use super::control::settings::{self, Nodes};
+use choose::{Wanted, factor};
+use experiment::{Answered, Experiment, Line};
+use fit::{ENOUGH, Fit, fit};
+use trial::Settled;
+
+/// Measure how the features answer the motion, and propose gains with margins
+#[derive(clap::Parser)]
+#[command(
+    name = "tune",
+    after_help = "It runs the task and moves the robot. For each feature that the mode controls, it halves the gains, moves the sensor to and
+fro with sines of 0.35 to 8 Hz, one after the other, and doubles their way until two of them agree. This takes about a
+minute for each way. All limits of the graph hold. From the answers it fits a gain, a resonance and a latency, and
+proposes the largest gains that keep the margins over all contacts. Then it runs the task with them, and compares.
+
+Examples:
+  tactflow tune graphs/hybrid.toml
+  tactflow tune graphs/hybrid.toml --feature pressure --with graphs/benches/pen.toml --with graphs/benches/toy_box.toml
+  tactflow tune graphs/force.toml --save        write the gains into the graph, and the contacts into the benches
+
+Exit codes: 0 success; 1 no gains are proposed for a feature; 2 the graph does not load, or has nothing to tune; 130
+interrupted."
+)]
+pub(super) struct TuneArgs {
+    /// The graph file
+    graph: PathBuf,
+    #[command(flatten)]
+    graph_args: GraphArgs,
+    /// Measure on this bench too, for an object of another stiffness; may be repeated
+    #[arg(long = "with", value_name = "FILE")]
+    others: Vec<PathBuf>,
+    /// The mode that is tuned; the one with the most features if not given
+    #[arg(long)]
+    mode: Option<String>,
+    /// The feature that is tuned; all of the mode if not given; may be repeated
+    #[arg(long = "feature", value_name = "NAME")]
+    features: Vec<String>,
+    /// Largest peak of the sensitivity
+    #[arg(long, value_name = "FACTOR", default_value_t = Wanted::default().peak)]
+    peak: f64,
+    /// Smallest gain margin [dB]
+    #[arg(long, value_name = "DB", default_value_t = Wanted::default().gain_db)]
+    gain_margin: f64,
+    /// Smallest phase margin [deg]
+    #[arg(long, value_name = "DEG", default_value_t = Wanted::default().phase_deg)]
+    phase_margin: f64,
+    /// Write the gains into the graph, and the contacts into the benches; comments stay
+    #[arg(long)]
+    save: bool,
+    /// Output format
+    #[arg(long, value_enum, default_value_t = Format::Text, value_name = "FORMAT")]
+    format: Format,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum Format {
+    /// For a terminal.
+    Text,
+    /// For a program.
+    Json,
+}
+
+/// What `tune` has found.
+#[derive(Debug, Serialize)]
+struct Tuned {
+    mode: String,
+    /// Name of the role of the arm.
+    arm: String,
+    wanted: Wanted,
+    contacts: Vec<Contact>,
+    /// The bench of each contact.
+    #[serde(skip)]
+    files: Vec<Option<PathBuf>>,
+    features: Vec<TunedFeature>,
+    /// How the task holds its features with the old and with the new gains, for each bench.
+    settled: Vec<Settled>,
+}
+
+/// One feature, over all contacts.
+#[derive(Debug, Serialize)]
+struct TunedFeature {
+    name: String,
+    /// The answers, for each contact.
+    answers: Vec<Found>,
+    /// Proportional, integral and derivative gain of the graph.
+    old: [f64; 3],
+    /// The gains that are proposed, rounded down to two digits; `None` if the margins do not hold with any.
+    new: Option<[f64; 3]>,
+    /// The margins of the new gains, for each contact.
+    margins: Vec<Margins>,
+    #[serde(skip)]
+    feature: Feature,
+}
+
+/// The answer of a feature over one contact.
+#[derive(Debug, Serialize)]
+struct Found {
+    object: String,
+    /// For each component that moves the feature: its name, and the fit.
+    fits: Vec<(&'static str, Fit)>,
+    /// Why there is no fit.
+    refused: Option<String>,
+}
+
+/// Why nothing is tuned.
+enum Stop {
+    Refused(String),
+    Interrupted,
+}
+
+impl From<String> for Stop {
+    fn from(message: String) -> Self {
+        Self::Refused(message)
+    }
+}
+
+pub(super) fn run(args: TuneArgs, shell: &Shell) -> Result<u8, u8> {
+    let request = args.graph_args.request(args.graph.clone());
+    let compiled = compile(shell.catalogue(), &request).map_err(|report| shell.reject(&report))?;
+    let tuned = match tune(&args, shell, &request, &compiled) {
+        Ok(tuned) => tuned,
+        Err(Stop::Interrupted) => return Ok(130),
+        Err(Stop::Refused(message)) => return Err(shell.refuse(message)),
+    };
+    match args.format {
+        Format::Json => shell.say_json(&tuned),
+        Format::Text => shell.say(page::text(&tuned).trim_end()),
+    }
+    let is_whole =
+        tuned.features.iter().all(|feature| feature.new.is_some()) && tuned.settled.iter().all(Settled::is_good);
+    if args.save && is_whole {
+        let written = save::save(&args, &compiled, &tuned, shell).map_err(|message| shell.refuse(message))?;
+        shell.say(&written);
+    } else if args.save {
+        shell.warning("nothing is written: not all features have gains that hold");
+    }
+    Ok(u8::from(!is_whole))
+}
+
+fn tune(args: &TuneArgs, shell: &Shell, request: &Request, compiled: &Compiled) -> Result<Tuned, Stop> {
+    let outline = compiled.outline();
+    let (command, port) = settings::commands(outline).next().ok_or("no role is an arm, so nothing moves".to_owned())?;
+    let (_, twist) = chain(&Nodes::new(outline, None), port)?;
+    let (mode, controlled) = controlled(args, outline, &twist)?;
+    let adder = adder(outline, &twist)?;
+    let wanted = Wanted { peak: args.peak, gain_db: args.gain_margin, phase_deg: args.phase_margin };
+    let benches: Vec<Option<PathBuf>> = [None].into_iter().chain(args.others.iter().cloned().map(Some)).collect();
+    let (mut contacts, mut files) = (Vec::new(), Vec::new());
+    let mut answers: Vec<Vec<Found>> = controlled.iter().map(|_| Vec::new()).collect();
+    for bench in &benches {
+        let (request, file) = on_bench(request, bench.as_ref(), shell)?;
+        let object = file.as_ref().and_then(|file| file.file_stem()).map(|stem| stem.to_string_lossy().into_owned());
+        files.push(file);
+        let mut contact =
+            Contact { object: object.unwrap_or_else(|| "object".into()), latency_ms: 0.0, features: BTreeMap::new() };
+        for (feature, answers) in controlled.iter().zip(&mut answers) {
+            let experiment = Experiment {
+                catalogue: shell.catalogue(),
+                request: &request,
+                mode,
+                adder: &adder,
+                feature,
+                component: 0,
+                period: outline.period_s,
+            };
+            let found = identify(&experiment, &contact.object, outline.period_s, shell)?;
+            if found.refused.is_none() {
+                let quantity = quantity(feature);
+                contact.features.insert(quantity.clone(), answer(&quantity, &found.fits));
+            }
+            answers.push(found);
+        }
+        contacts.push(contact);
+    }
+    let features: Vec<TunedFeature> = controlled
+        .into_iter()
+        .zip(answers)
+        .map(|(feature, answers)| propose(feature, answers, &contacts, wanted, outline.period_s))
+        .collect();
+    let arm = command.trim_end_matches(".velocity").to_owned();
+    let mut tuned = Tuned { mode: mode.name.clone(), arm, wanted, contacts, files, features, settled: Vec::new() };
+    for (bench, contact) in benches.iter().zip(&tuned.contacts) {
+        let (request, _) = on_bench(request, bench.as_ref(), shell)?;
+        tuned.settled.extend(trial::compare(shell.catalogue(), &request, mode, &tuned.features, &contact.object)?);
+    }
+    Ok(tuned)
+}
+
+/// Returns the mode that is tuned, and its features.
+fn controlled<'o>(
+    args: &TuneArgs,
+    outline: &'o Outline,
+    twist: &str,
+) -> Result<(&'o OutlinedMode, Vec<Feature>), String> {
+    let task = settings::task_of(outline, twist);
+    if !task.is_empty() {
+        return Err(format!("the arm follows the part `{task}`: tune the file of this part alone, on the same bench"));
+    }
+    let moving = |mode: &OutlinedMode| {
+        let law = law(&Nodes::new(outline, Some(mode)), twist);
+        law.features.into_iter().filter(|feature| feature.moves() && feature.kp > 0.0).collect::<Vec<_>>()
+    };
+    let modes: Vec<&OutlinedMode> = settings::modes(outline, task).flatten().collect();
+    let mode = match &args.mode {
+        Some(name) => modes.iter().find(|mode| mode.name == *name).ok_or_else(|| {
+            let names: Vec<String> = modes.iter().map(|mode| format!("`{}`", mode.name)).collect();
+            format!("the graph has no mode `{name}`; its modes are {}", names.join(", "))
+        })?,
+        None => modes
+            .iter()
+            .max_by_key(|mode| moving(mode).len())
+            .ok_or("a graph without modes has no mode to tune: add a mode, as docs/composing-a-task.md shows")?,
+    };
+    let features = moving(mode);
+    let known: Vec<String> = features.iter().map(|feature| format!("`{}`", feature.name)).collect();
+    if let Some(unknown) = args.features.iter().find(|name| features.iter().all(|feature| feature.name != **name)) {
+        return Err(format!("the mode `{}` does not control `{unknown}`; it controls {}", mode.name, known.join(", ")));
+    }
+    let is_asked = |feature: &Feature| args.features.is_empty() || args.features.contains(&feature.name);
+    let features: Vec<Feature> = features.into_iter().filter(is_asked).collect();
+    match features.is_empty() {
+        true => Err(format!("the mode `{}` controls no feature with a `pid`", mode.name)),
+        false => Ok((*mode, features)),
+    }
+}
+
+/// Returns the node that adds the test signal to the motion.
+fn adder(outline: &Outline, twist: &str) -> Result<String, String> {
+    let writer = Nodes::new(outline, None).writer(twist).filter(|node| node.kind.text == "twist_adder");
+    let help = "add one, so that the test signal has a way in:\n\n[nodes.sum]\ntype = \"twist_adder\"\nin.touch = ";
+    writer
+        .map(|node| node.name.clone())
+        .ok_or_else(|| format!("the motion `{twist}` comes from no `twist_adder`; {help}\"{twist}\""))
+}
+
+/// Returns the request for another bench with its file, and lets simulated devices run long enough.
+fn on_bench(request: &Request, bench: Option<&PathBuf>, shell: &Shell) -> Result<(Request, Option<PathBuf>), String> {
+    let mut request = Request { bench: bench.cloned().or_else(|| request.bench.clone()), ..request.clone() };
+    let compiled = compile(shell.catalogue(), &request).map_err(|report| report.render(false))?;
+    request.set.extend(experiment::long_enough(compiled.outline(), experiment::duration(compiled.outline().period_s)));
+    Ok((request, bench_file(&compiled)))
+}
+
+/// Returns the file of the bench that a request uses, as the places of its devices say.
+fn bench_file(compiled: &Compiled) -> Option<PathBuf> {
+    compiled.outline().devices.first().map(|device| PathBuf::from(&device.place.file))
+}
+
+/// Returns the name of what a feature measures.
+fn quantity(feature: &Feature) -> String {
+    let port = feature.measured.as_deref().unwrap_or(&feature.name);
+    port.rsplit('.').next().unwrap_or(port).to_owned()
+}
+
+/// First way of a linear [m] and of an angular test signal [rad].
+const FIRST: [f64; 2] = [0.15e-3, 0.005];
+/// Number of times that the way is doubled.
+const DOUBLINGS: usize = 4;
+/// Difference of two responses that agree, as the median of all frequencies [1].
+const AGREES: f64 = 0.2;
+
+/// Part of the response that a fit may leave unexplained [1].
+const MAX_RESIDUAL: f64 = 0.3;
+
+/// Measures how a feature answers each component that moves it.
+fn identify(experiment: &Experiment<'_>, object: &str, period: f64, shell: &Shell) -> Result<Found, Stop> {
+    let feature = experiment.feature;
+    let components: Vec<usize> = (0..6).filter(|i| feature.column[*i] != 0.0).collect();
+    let mut found = Found { object: object.to_owned(), fits: Vec::new(), refused: None };
+    for component in components {
+        let experiment = Experiment { component, ..experiment.clone() };
+        let known = known(feature, component, period);
+        match agreed(&experiment, shell)? {
+            Ok(lines) => match fit(&lines, known) {
+                Ok(fit) if fit.residual > MAX_RESIDUAL => {
+                    found.refused = Some(format!(
+                        "a gain, a resonance and a latency leave {:.0} % of the response unexplained",
+                        100.0 * fit.residual
+                    ));
+                }
+                Ok(fit) => found.fits.push((super::control::law::COMPONENTS[component], fit)),
+                Err(few) => {
+                    found.refused = Some(format!(
+                        "only {few} of {} frequencies answer with a coherence of {} or more, and a fit needs {ENOUGH}",
+                        lines.len(),
+                        fit::COHERENT
+                    ));
+                }
+            },
+            Err(why) => found.refused = Some(why),
+        }
+        if found.refused.is_some() {
+            break;
+        }
+    }
+    Ok(found)
+}
+
+/// Returns the response of what the graph states, at half of the gains and for one component alone.
+fn known(feature: &Feature, component: usize, period: f64) -> impl Fn(f64) -> nalgebra::Complex<f64> {
+    let around = Loop::new(feature, &Answer::default(), 0.0, period).times(0.5);
+    let column = feature.column[component];
+    move |omega| around.known(omega) * column
+}
+
+/// Doubles the test signal until two responses agree: friction hides a small motion, and limits spoil a large one.
+fn agreed(experiment: &Experiment<'_>, shell: &Shell) -> Result<Result<Vec<Line>, String>, Stop> {
+    let mut last: Option<Vec<Line>> = None;
+    let mut why = "no two ways of the test signal gave the same response".to_owned();
+    for doubling in 0..=DOUBLINGS {
+        let way = FIRST[experiment.component / 3] * f64::from(1_u32 << doubling);
+        let unit = if experiment.component < 3 { "m" } else { "rad" };
+        shell.say_beside(&format!("`{}`: a test signal of {way} {unit}", experiment.feature.name));
+        let lines = match experiment.run(way)? {
+            Answered::Lines(lines) => lines,
+            Answered::Nothing(reason) => {
+                why = format!("with a test signal of {way} {unit}, {reason}");
+                break;
+            }
+            Answered::Interrupted => return Err(Stop::Interrupted),
+        };
+        if last.as_ref().is_some_and(|last| difference(last, &lines).is_some_and(|far| far < AGREES)) {
+            return Ok(Ok(lines));
+        }
+        last = Some(lines);
+    }
+    Ok(Err(why))
+}
+
+/// Returns the median difference of two responses, over the frequencies where both are coherent.
+fn difference(one: &[Line], other: &[Line]) -> Option<f64> {
+    let both = one.iter().zip(other).filter(|(a, b)| a.coherence.min(b.coherence) >= fit::COHERENT);
+    let mut far: Vec<f64> = both.map(|(a, b)| (a.open - b.open).norm() / b.open.norm()).collect();
+    far.sort_by(f64::total_cmp);
+    far.get(far.len() / 2).copied().filter(|_| far.len() >= ENOUGH)
+}
+
+/// Returns the answer of a feature to all components. The resonance and the latency are those of the first one.
+///
+/// A contact that sticks follows a small motion only in part. It can slide at any time, so what geometry says counts if
+/// it is more.
+fn answer(quantity: &str, fits: &[(&'static str, Fit)]) -> Answer {
+    let geometry = Answer::of_geometry(quantity).unwrap_or_default().row();
+    let mut answer = Answer::default();
+    for (component, fit) in fits {
+        let entry = match *component {
+            "vx" => &mut answer.vx,
+            "vy" => &mut answer.vy,
+            "vz" => &mut answer.vz,
+            "wx" => &mut answer.wx,
+            "wy" => &mut answer.wy,
+            _ => &mut answer.wz,
+        };
+        let index = super::control::law::COMPONENTS.iter().position(|name| name == component);
+        let slides = index.map_or(0.0, |i| geometry[i]);
+        *entry = Some(if slides.abs() > fit.gain.abs() { slides } else { page::rounded(fit.gain) });
+    }
+    let Some((_, main)) = fits.first() else { return answer };
+    answer.resonance_hz = main.resonance.map(|(hz, _)| page::rounded(hz));
+    answer.damping_ratio = main.resonance.map(|(_, damping)| page::rounded(damping));
+    answer.latency_ms = Some(page::rounded(main.latency * 1e3));
+    answer
+}
+
+fn propose(feature: Feature, answers: Vec<Found>, contacts: &[Contact], wanted: Wanted, period: f64) -> TunedFeature {
+    let old = [feature.kp, feature.ki, feature.kd];
+    let is_measured = answers.iter().all(|found| found.refused.is_none());
+    let loops: Vec<Loop> = contacts.iter().filter_map(|contact| Loop::over(&feature, contact, period)).collect();
+    let factor = factor(&loops, wanted).filter(|_| is_measured && loops.len() == contacts.len());
+    // Rounded down, so that the margins hold.
+    let factor = factor.map(|factor| page::rounded_down(feature.kp * factor) / feature.kp);
+    let new = factor.map(|factor| old.map(|gain| page::rounded(gain * factor)));
+    let margins = factor.map(|factor| loops.iter().map(|around| margins(&around.times(factor))).collect());
+    TunedFeature { name: feature.name.clone(), answers, old, new, margins: margins.unwrap_or_default(), feature }
+}

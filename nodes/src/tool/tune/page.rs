@@ -1,0 +1,151 @@
+//! What `tune` has found, as text.
+
+use std::fmt::Write;
+
+use tactflow_runtime::cli::table;
+
+use super::{Found, Tuned, TunedFeature, save};
+
+/// Columns of the table of answers.
+const ANSWERS: [&str; 7] = ["contact", "motion", "per m or rad", "resonance", "damping", "latency", "frequencies"];
+/// Columns of the table of margins.
+const MARGINS: [&str; 6] = ["contact", "crossover", "phase margin", "gain margin", "peak", "bandwidth"];
+
+pub(super) fn text(tuned: &Tuned) -> String {
+    let mut text = String::new();
+    for feature in &tuned.features {
+        let _ = write!(text, "`{}` in the mode `{}`\n\n", feature.name, tuned.mode);
+        text += &answers(&feature.answers);
+        text += &gains(feature);
+        text.push('\n');
+    }
+    text += &settled(tuned);
+    text += &lines(tuned);
+    text
+}
+
+fn answers(found: &[Found]) -> String {
+    let rows = found.iter().flat_map(|one| {
+        one.fits.iter().map(|(component, fit)| {
+            let (hz, damping) = fit.resonance.unzip();
+            [
+                one.object.clone(),
+                (*component).to_owned(),
+                rounded(fit.gain).to_string(),
+                hz.map_or_else(|| "none".into(), |hz| format!("{hz:.1} Hz")),
+                damping.map_or_else(String::new, |damping| format!("{damping:.2}")),
+                format!("{:.0} ms", fit.latency * 1e3),
+                format!("{}, {:.0} % off", fit.frequencies, fit.residual * 100.0),
+            ]
+        })
+    });
+    let rows: Vec<[String; 7]> = [ANSWERS.map(str::to_owned)].into_iter().chain(rows).collect();
+    let mut text = if rows.len() > 1 { table(&rows, 2, 7) } else { String::new() };
+    for (object, why) in found.iter().filter_map(|one| Some((&one.object, one.refused.as_ref()?))) {
+        let _ = writeln!(text, "Not measured over `{object}`: {why}.");
+    }
+    text
+}
+
+fn gains(feature: &TunedFeature) -> String {
+    let Some([kp, ki, kd]) = feature.new else {
+        let is_measured = feature.answers.iter().all(|found| found.refused.is_none());
+        let why = if is_measured {
+            "No gain keeps the margins: the motion increases the error.\n"
+        } else {
+            "No gains are proposed.\n"
+        };
+        return why.into();
+    };
+    let [old_kp, old_ki, old_kd] = feature.old;
+    let rows = feature.answers.iter().zip(&feature.margins).map(|(found, margins)| {
+        let with = |value: Option<f64>, unit: &str, digits: usize| {
+            value.map_or_else(|| "none".to_owned(), |value| format!("{value:.digits$} {unit}"))
+        };
+        [
+            found.object.clone(),
+            with(margins.crossover_hz, "Hz", 2),
+            with(margins.phase_deg, "deg", 0),
+            with(margins.gain_db, "dB", 1),
+            format!("{:.2}", margins.peak_sensitivity),
+            with(margins.bandwidth_hz, "Hz", 2),
+        ]
+    });
+    let rows: Vec<[String; 6]> = [MARGINS.map(str::to_owned)].into_iter().chain(rows).collect();
+    let mut text = format!("\nkp {old_kp} becomes {kp}, ki {old_ki} becomes {ki}, kd {old_kd} becomes {kd}:\n");
+    text += &table(&rows, 1, 6);
+    text
+}
+
+fn settled(tuned: &Tuned) -> String {
+    let mut text = String::new();
+    for one in &tuned.settled {
+        let error = |value: Option<f64>| value.map_or_else(|| "unknown".into(), |value| rounded(value).to_string());
+        let _ = write!(
+            text,
+            "Over `{}`, the error of `{}` in the second half is {} with the old gains and {} with the new ones (rms)",
+            one.object,
+            one.feature,
+            error(one.old),
+            error(one.new)
+        );
+        match &one.failure {
+            Some(why) => {
+                let _ = writeln!(text, ": not good, {why}.");
+            }
+            None => text += ".\n",
+        }
+    }
+    text
+}
+
+/// The lines for the files.
+fn lines(tuned: &Tuned) -> String {
+    let mut text = String::new();
+    for feature in &tuned.features {
+        let (Some([kp, ki, kd]), Some(pid)) = (feature.new, &feature.feature.pid) else { continue };
+        let _ = writeln!(text, "\n[nodes.{pid}]");
+        let gains = [("kp", kp), ("ki", ki), ("kd", kd)].into_iter().filter(|(_, gain)| *gain != 0.0);
+        for (key, gain) in gains {
+            let _ = writeln!(text, "gains.{}.{key} = {gain:?}", feature.name);
+        }
+    }
+    if tuned.contacts.iter().any(|contact| !contact.features.is_empty()) {
+        let _ = writeln!(text, "\n[facts.{}]                         # in the bench\ncontacts = [", tuned.arm);
+        for contact in tuned.contacts.iter().filter(|contact| !contact.features.is_empty()) {
+            let _ = writeln!(text, "    {},", save::value(contact));
+        }
+        text += "]\n";
+    }
+    text
+}
+
+/// Rounds a number to three digits.
+pub(super) fn rounded(value: f64) -> f64 {
+    digits(value, 3, f64::round)
+}
+
+/// Rounds a number down to two digits.
+pub(super) fn rounded_down(value: f64) -> f64 {
+    digits(value, 2, f64::floor)
+}
+
+fn digits(value: f64, digits: i32, round: impl Fn(f64) -> f64) -> f64 {
+    if value == 0.0 || !value.is_finite() {
+        return value;
+    }
+    let scale = 10.0_f64.powi(digits - 1 - value.abs().log10().floor() as i32);
+    // Through text, so that no digits of the division are left.
+    format!("{:e}", round(value * scale) / scale).parse().unwrap_or(value)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_number_keeps_three_digits_and_a_gain_never_grows() {
+        assert_eq!([12.3456, -0.012345, 0.0, 1234.5].map(rounded), [12.3, -0.0123, 0.0, 1230.0]);
+        assert_eq!([12.99, 0.0199, 3.5].map(rounded_down), [12.0, 0.019, 3.5]);
+    }
+}

@@ -1,0 +1,75 @@
+//! `tune`: what it measures, what it proposes, and what it writes.
+
+use std::fs;
+use std::path::Path;
+
+use serde_json::Value;
+
+use crate::cli::in_new_folder;
+use crate::tool::say;
+
+/// The text of a shipped file, with the files that it names at their own places.
+fn shipped(file: &str) -> String {
+    let graphs = tactflow_tests::workspace().join("graphs");
+    let text = fs::read_to_string(graphs.join(file)).unwrap();
+    let text = text.replace("\"../", &format!("\"{}/", graphs.display()));
+    ["parts/", "benches/"]
+        .iter()
+        .fold(text, |text, folder| text.replace(&format!("\"{folder}"), &format!("\"{}/{folder}", graphs.display())))
+}
+
+#[test]
+fn a_slow_edge_gets_the_gain_that_was_found_by_hand_and_the_files_keep_their_comments() {
+    let (_folder, path) = in_new_folder("edge.toml");
+    fs::write(&path, shipped("edge.toml")).unwrap();
+    let bench = Path::new(&path).with_file_name("edge_bench.toml").display().to_string();
+    fs::write(&bench, shipped("benches/edge.toml")).unwrap();
+    let from = ["--set", "nodes.pid.gains.orientation.kp=1.0", "--set", "nodes.pid.gains.orientation.ki=0.0"];
+    let args = ["tune", &path, "--bench", &bench, "--feature", "orientation", "--save"];
+    let said = say(&[&args[..], &from].concat());
+    assert_eq!(said.code, 0, "{}{}", said.out, said.err);
+    // The gain that was found by hand on another simulator, with another arm and another foam.
+    let graph: toml::Table = toml::from_str(&fs::read_to_string(&path).unwrap()).unwrap();
+    let kp = graph["nodes"]["pid"]["gains"]["orientation"]["kp"].as_float().unwrap();
+    assert!((kp / 8.0 - 1.0).abs() < 0.2, "{kp}");
+    let comments = |text: &str| text.matches('#').count();
+    for (file, old) in [(&path, shipped("edge.toml")), (&bench, shipped("benches/edge.toml"))] {
+        assert_eq!(comments(&fs::read_to_string(file).unwrap()), comments(&old), "{file}");
+    }
+    let page = say(&["explain", &path, "--bench", &bench, "--format", "json"]);
+    let explained: Value = serde_json::from_str(&page.out).unwrap();
+    let modes = explained["motions"][0]["modes"].as_array().unwrap();
+    let loops = modes.iter().flat_map(|mode| mode["loops"].as_array().unwrap());
+    let of_edge: Vec<&Value> = loops.filter(|one| one["feature"] == "orientation").collect();
+    assert!(of_edge.iter().all(|one| one["object"] == "edge_bench"), "{of_edge:?}");
+    let margins = &of_edge.first().unwrap()["margins"];
+    assert!(margins["gain_db"].as_f64().unwrap() > 6.0, "{margins}");
+}
+
+#[test]
+fn what_cannot_be_tuned_says_why() {
+    for (args, why) in [
+        (
+            &["graphs/hybrid.toml", "--mode", "servos"][..],
+            "the graph has no mode `servos`; its modes are `approach`, `servo`",
+        ),
+        (
+            &["graphs/hybrid.toml", "--feature", "z"],
+            "the mode `servo` does not control `z`; it controls `x`, `y`, `pressure`",
+        ),
+        (&["graphs/finger_press.toml"], "a graph without modes has no mode to tune"),
+    ] {
+        let said = say(&[&["tune"], args].concat());
+        assert_eq!(said.code, 2, "{}", said.err);
+        assert!(said.err.contains(why), "{args:?}: {}", said.err);
+    }
+}
+
+#[test]
+fn a_loop_that_pushes_the_wrong_way_gets_no_gains() {
+    // With a reversed column the contact leaves the pad, and the mode ends.
+    let set = "nodes.jacobian.columns.x=[1, 0, 0, 0, 0, 0]";
+    let said = say(&["tune", "graphs/hybrid.toml", "--feature", "x", "--set", set]);
+    assert_eq!(said.code, 1, "{}{}", said.out, said.err);
+    assert!(said.out.contains("No gain"), "{}", said.out);
+}
