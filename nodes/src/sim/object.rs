@@ -81,6 +81,10 @@ pub struct ScriptedMove {
     /// Rotation about its centre and the sensor's z at the start.
     #[param(unit = "rad", default = 0.0)]
     pub(crate) turn: f64,
+    /// Whether the speed is the same all the time, and so begins and ends with a jump. Otherwise the motion speeds up
+    /// and slows down smoothly, and is 1.5 times as fast in the middle.
+    #[param(default = false)]
+    pub(crate) steady: bool,
 }
 
 /// An object in the base.
@@ -182,7 +186,8 @@ impl Object {
         let (mut angle, mut spin) = (0.0, 0.0);
         for step in &self.script {
             let span = step.to_s - step.from_s;
-            let (part, rate) = ease((time - step.from_s) / span);
+            let t = (time - step.from_s) / span;
+            let (part, rate) = if step.steady { ramp(t) } else { ease(t) };
             position += Vec3::from(step.by) * part;
             velocity += Vec3::from(step.by) * (rate / span);
             angle += step.turn * part;
@@ -219,6 +224,11 @@ impl Object {
 /// Returns a value that goes from 0 to 1 for t from 0 to 1 without a jump of its slope, and the slope.
 fn ease(t: f64) -> (f64, f64) {
     if (0.0..1.0).contains(&t) { (t * t * (3.0 - 2.0 * t), 6.0 * t * (1.0 - t)) } else { (f64::from(t >= 1.0), 0.0) }
+}
+
+/// Returns a value that goes from 0 to 1 for t from 0 to 1 with the slope 1, and the slope.
+fn ramp(t: f64) -> (f64, f64) {
+    if (0.0..1.0).contains(&t) { (t, 1.0) } else { (f64::from(t >= 1.0), 0.0) }
 }
 
 fn shape_of(params: &ObjectParams) -> Result<Geometry, String> {

@@ -244,7 +244,7 @@ fn the_imprint_keeps_the_sum_and_the_centre_of_a_load() {
 #[test]
 fn objects_move_smoothly_along_their_script() {
     let (from_s, to_s) = (1.0, 2.0);
-    let motion = vec![ScriptedMove { from_s, to_s, by: [0.0, 0.01, 0.0], turn: 1.0 }];
+    let motion = vec![ScriptedMove { from_s, to_s, by: [0.0, 0.01, 0.0], turn: 1.0, steady: false }];
     let mut object = object(&ObjectParams { motion, ..ball(0.04, [0.0, 0.0, 0.05]) });
     // A point of the object, in its own frame.
     let mark = Vec3::new(0.03, 0.0, 0.01);
@@ -259,6 +259,22 @@ fn objects_move_smoothly_along_their_script() {
     }
     let wanted = Vec3::new(0.03 * 1f64.cos(), 0.01 + 0.03 * 1f64.sin(), 0.06);
     assert!(last.distance(wanted) < 1e-12, "{last}");
+}
+
+#[test]
+fn a_steady_motion_has_one_speed() {
+    let motion = vec![ScriptedMove { from_s: 1.0, to_s: 5.0, by: [0.0, 0.02, 0.0], turn: 0.4, steady: true }];
+    let mut object = object(&ObjectParams { motion, ..ball(0.04, [0.0, 0.0, 0.05]) });
+    for (time, part) in [(0.5, 0.0), (2.0, 0.25), (3.0, 0.5), (4.9, 0.975), (6.0, 1.0)] {
+        object.step(time, 0.001, Vec3::ZERO);
+        let mark = object.pose.transform_point(Vec3::new(0.03, 0.0, 0.0));
+        let angle: f64 = 0.4 * part;
+        let wanted = Vec3::new(0.03 * angle.cos(), 0.02 * part + 0.03 * angle.sin(), 0.05);
+        assert!(mark.distance(wanted) < 1e-12, "{time}: {mark}");
+        let moves = f64::from(part > 0.0 && part < 1.0);
+        assert!((object.velocity_at(object.pose.translation).y - 0.005 * moves).abs() < 1e-12, "{time}");
+        assert!((object.spin().z - 0.1 * moves).abs() < 1e-12, "{time}");
+    }
 }
 
 #[test]

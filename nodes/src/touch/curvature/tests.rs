@@ -109,7 +109,8 @@ fn the_rate_turns_a_sensor_with_the_line() {
 
 #[test]
 fn what_is_no_line_is_absent() {
-    let cases: [(&str, &str, Box<dyn Fn(f64, f64) -> f64>); 6] = [
+    type Value = Box<dyn Fn(f64, f64) -> f64>;
+    let cases: [(&str, &str, Value); 6] = [
         ("nothing", "", Box::new(|_, _| 0.0)),
         ("a round print", "", Box::new(|x, y| libm::exp(-0.5 * (x * x + y * y) / 6.4e-5))),
         ("a short line", "min_length_m = 0.05", Box::new(line(0.0, 0.04, 0.0))),
