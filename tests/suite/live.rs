@@ -2,8 +2,9 @@
 
 use std::io::{BufRead, BufReader};
 use std::process::{Child, Command, Stdio};
+use std::sync::atomic::{AtomicUsize, Ordering};
 
-use tactflow_runtime::device::{Description, Device, DeviceError, Driver, Link, Live, Opened};
+use tactflow_runtime::device::{Description, Device, DeviceError, Driver, Link, Live, Opened, Output};
 use tactflow_runtime::engine::{self, End, Engine, RunOptions};
 use tactflow_runtime::fault::Cause;
 use tactflow_runtime::graph::{Request, compile};
@@ -104,14 +105,101 @@ impl Device for Brittle {
 }
 
 #[test]
-fn a_driver_that_panics_is_a_fault_of_its_device() {
-    let request =
-        Request { bench_text: Some("devices.b.type = 'brittle'\nbind.a = 'b'".into()), ..Request::text(GRAPH) };
+fn a_driver_that_panics_is_a_fault_of_its_device_and_is_not_started_again() {
+    for reconnect in [false, true] {
+        let (end, _) = run_device::<Brittle>("brittle", reconnect);
+        let End::Fault(fault) = end else { panic!("{end:?}") };
+        assert_eq!((fault.node.as_str(), fault.cause), ("b", Cause::Device("it panicked: brittle".into())));
+    }
+}
+
+/// Runs a graph on a device of this type for a second.
+fn run_device<D: Device>(name: &str, reconnect: bool) -> (End, Engine) {
+    let bench = format!("devices.b = {{ type = '{name}', reconnect = {reconnect} }}\nbind.a = 'b'");
+    let request = Request { bench_text: Some(bench), ..Request::text(GRAPH) };
     let plan =
-        compile(&catalogue().device::<Brittle>(), &request).unwrap_or_else(|report| panic!("{}", report.render(false)));
-    let outcome = engine::run(&mut Engine::new(plan), &RunOptions::default(), &mut |_| {}).unwrap();
-    let End::Fault(fault) = outcome.end else { panic!("{:?}", outcome.end) };
-    assert_eq!((fault.node.as_str(), fault.cause), ("b", Cause::Device("it panicked: brittle".into())));
+        compile(&catalogue().device::<D>(), &request).unwrap_or_else(|report| panic!("{}", report.render(false)));
+    let mut engine = Engine::new(plan);
+    let options = RunOptions { duration: Some(1.0), ..RunOptions::default() };
+    let outcome = engine::run(&mut engine, &options, &mut |_| {}).unwrap();
+    (outcome.end, engine)
+}
+
+/// A driver that ends with an error after five samples, at its first two starts. With `ends`, it forbids another one.
+struct Flaky {
+    value: Output<Scalar>,
+    attempt: usize,
+    ends: bool,
+}
+
+#[async_trait::async_trait]
+impl Live for Flaky {
+    async fn run(self: Box<Self>, mut link: Link) -> Result<(), DeviceError> {
+        for number in 0.. {
+            if self.attempt < 2 && number == 5 {
+                if self.ends {
+                    link.forbid_return();
+                }
+                return Err(DeviceError(format!("attempt {} failed", self.attempt)));
+            }
+            let stamp = link.arrival();
+            link.publish(|samples| *samples.write(self.value, stamp, number) = self.attempt as f64);
+            let stopped = link.stopped();
+            tokio::select! {
+                () = stopped => break,
+                () = tokio::time::sleep(std::time::Duration::from_millis(10)) => {}
+            }
+        }
+        Ok(())
+    }
+}
+
+/// Opens a driver that is the `attempt`-th one.
+fn open_flaky(attempt: usize, ends: bool) -> Opened {
+    let mut description = Description::every(0.01);
+    let value = description.fills("length").output::<Scalar>("value", ScalarShape::of(Unit::METRE));
+    Opened { description, driver: Driver::Live(Box::new(Flaky { value, attempt, ends })) }
+}
+
+macro_rules! flaky {
+    ($name:ident, $attempts:ident, $ends:expr) => {
+        static $attempts: AtomicUsize = AtomicUsize::new(0);
+
+        /// A device whose driver fails twice.
+        #[derive(Describe)]
+        struct $name;
+
+        impl Device for $name {
+            type Params = ();
+
+            fn open((): ()) -> Result<Opened, Mistakes> {
+                Ok(open_flaky($attempts.fetch_add(1, Ordering::SeqCst), $ends))
+            }
+        }
+    };
+}
+
+flaky!(FailsTwice, FAILS_TWICE, false);
+flaky!(FailsOnce, FAILS_ONCE, false);
+flaky!(FailsForGood, FAILS_FOR_GOOD, true);
+
+#[test]
+fn a_driver_that_fails_is_started_again_where_the_bench_says_so() {
+    let (end, engine) = run_device::<FailsTwice>("fails_twice", true);
+    let causes: Vec<String> = engine.halts().iter().map(|halt| halt.fault.to_string()).collect();
+    assert_eq!(end, End::Duration, "{causes:?}");
+    assert!(causes.iter().any(|cause| cause.contains("attempt 0 failed")), "{causes:?}");
+    assert_eq!(engine.counts().next(), Some(("b", &[("restarts", 2)][..])));
+    assert_eq!(engine.get::<Scalar>("a.value"), Some(&2.0), "the third driver samples");
+    assert!(engine.halts().iter().all(|halt| halt.until.is_some()), "{causes:?}");
+}
+
+#[test]
+fn a_driver_that_fails_ends_the_run_without_reconnect_or_if_it_forbids_a_return() {
+    for (end, _) in [run_device::<FailsOnce>("fails_once", false), run_device::<FailsForGood>("fails_for_good", true)] {
+        let End::Fault(fault) = end else { panic!("{end:?}") };
+        assert_eq!(fault.cause, Cause::Device("attempt 0 failed".into()));
+    }
 }
 
 #[test]

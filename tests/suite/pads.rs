@@ -182,6 +182,31 @@ fn a_fingertip_at_its_ceiling_stops_its_own_approach_and_the_palm_still_retreats
     }
 }
 
+#[test]
+fn a_palm_that_loses_its_contact_does_not_push_on() {
+    let slide = Request::file(workspace().join("tests/data/two_pads/slide.toml"));
+    let press = "devices.palm.press=[{ from_s = 0.5, to_s = 2.0, at = [0.01, 0.0], force = 3.0 }]";
+    let request = slide.set("modes.slide.set.slide.twist=[0, 0, 0.005, 0, 0, 0]").set(press);
+    let mut engine = Engine::new(load(&request.set("devices.finger.press=[]")));
+    let (mut last, mut speeds) = (None, Vec::new());
+    while let Some(next) = engine.next().filter(|next| *next < 3_800_000_000) {
+        engine.tick(next).unwrap();
+        let Some(palm) = get::<Pose>(&engine, "move.state.sensor_pose").map(|pose| pose.0) else { continue };
+        let time = next as f64 * 1e-9;
+        if let Some((before, pose)) = last.replace((time, palm)) {
+            speeds.push((time, normal_speed(&pose, &palm, time - before)));
+        }
+    }
+    let fastest = |from: f64, to: f64| {
+        let within = speeds.iter().filter(|(time, _)| (from..to).contains(time));
+        within.map(|(_, speed)| *speed).fold(f64::NEG_INFINITY, f64::max)
+    };
+    assert!(fastest(1.0, 1.9) > 0.004, "it presses: {}", fastest(1.0, 1.9));
+    // At rest after two periods of 4 ms and the time to brake, 5 mm/s at 2 m/s², until 500 ms have passed.
+    assert!(fastest(2.02, 2.49) < 1e-4, "{} m/s", fastest(2.02, 2.49));
+    assert!(fastest(2.6, 3.8) > 0.004, "it searches: {}", fastest(2.6, 3.8));
+}
+
 const BARE: &str = "[graph]\nclock = 'arm'\nstart = 'there'\n[roles]\narm = 'bare_arm'\n\
     [commands]\narm.velocity = 'move.velocity'\n\
     [nodes.wave]\ntype = 'twist_source'\ntwist = [0, 0, 0, 0, 0, 0]\n\

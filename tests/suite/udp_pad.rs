@@ -23,9 +23,11 @@ enum Act {
     Silence,
     /// Sends frames to the end of the test, 10 ms apart.
     FramesToTheEnd,
+    /// The same, with a load of 1 N on a patch of four by four tactels.
+    LoadToTheEnd,
 }
 
-/// A pad of 16 by 16 tactels that nothing touches. It follows its script in steps that the test takes, as a busy machine
+/// A pad of 16 by 16 tactels that nothing touches at first. It follows its script in steps that the test takes, as a busy machine
 /// has a time of its own.
 struct Pad {
     address: SocketAddr,
@@ -61,18 +63,22 @@ fn pad(script: Vec<Act>) -> Pad {
     let thread = thread::spawn(move || {
         let mut driver = hello(&socket);
         let mut number = 0_u64;
-        let mut frame = |driver: SocketAddr| {
+        let mut frame = |driver: SocketAddr, cells: &[f32; 256]| {
             number += 1;
-            let datagram = [&number.to_le_bytes()[..], &[0; 4 * 256]].concat();
+            let cells = cells.iter().flat_map(|cell| cell.to_le_bytes());
+            let datagram: Vec<u8> = number.to_le_bytes().into_iter().chain(cells).collect();
             socket.send_to(&datagram, driver).unwrap();
             wait();
         };
+        let (rest, load) =
+            ([0.0; 256], std::array::from_fn(|i| if i / 16 < 4 && i % 16 < 4 { 1.0 / 16.0 } else { 0.0 }));
         for act in script {
             match act {
-                Act::Frames(count) => (0..count).for_each(|_| frame(driver)),
-                Act::FramesToTheEnd => {
+                Act::Frames(count) => (0..count).for_each(|_| frame(driver, &rest)),
+                Act::FramesToTheEnd | Act::LoadToTheEnd => {
+                    let cells = if matches!(act, Act::LoadToTheEnd) { &load } else { &rest };
                     while !must_end.load(Ordering::SeqCst) {
-                        frame(driver);
+                        frame(driver, cells);
                     }
                 }
                 Act::Nonsense => drop(socket.send_to(b"nonsense", driver).unwrap()),
@@ -115,6 +121,66 @@ fn a_pad_that_goes_silent_holds_the_arm_until_it_is_back() {
 #[test]
 fn so_does_a_pad_that_the_bench_lets_come_back() {
     holds_until_it_is_back("devices.skin.reconnect=true");
+}
+
+/// Runs `force` on a pad with a self-test of 20 frames that goes silent and comes back as `after` says. Returns the end,
+/// and the greatest speed of a joint in each tick.
+fn comes_back(reconnect: &str, after: Act) -> (End, Engine, Vec<(i64, f64)>) {
+    let pad = pad(vec![Act::Frames(60), Act::Silence, after]);
+    let facts = "[facts.pad]\nrest_frames = 20\ntare_bound = 0.01\n";
+    let bench = bench(pad.address).replace("[facts.pad]\n", facts);
+    let request = Request::file(workspace().join("graphs/force.toml")).set(reconnect).set(SETPOINT);
+    let request = Request { bench_text: Some(bench), ..request };
+    let compiled = compile(&catalogue(), &request).unwrap_or_else(|report| panic!("{}", report.render(false)));
+    let (mut engine, mut fastest) = (Engine::new(compiled), Vec::new());
+    let options = RunOptions { duration: Some(3.0), ..RunOptions::default() };
+    let outcome = run(&mut engine, &options, &mut |engine| {
+        let command = engine.commands("arm").unwrap();
+        fastest.push((engine.now(), command.iter().fold(0.0, |fastest: f64, speed| fastest.max(speed.abs()))));
+        let is_long = |halt: &Halt| halt.until.is_none() && engine.now() - halt.fault.time > 200_000_000;
+        if engine.halts().iter().any(|halt| is_lost(halt) && is_long(halt)) {
+            pad.speaks.store(true, Ordering::SeqCst);
+        }
+    });
+    pad.end();
+    (outcome.unwrap().end, engine, fastest)
+}
+
+/// Returns the time from the end of the loss to the next motion [s].
+fn rest_after(engine: &Engine, fastest: &[(i64, f64)]) -> f64 {
+    let lost = engine.halts().iter().find(|halt| is_lost(halt)).expect("it was lost");
+    let until = lost.until.expect("it is back");
+    let moves = fastest.iter().find(|(at, speed)| *at > until && *speed > 0.0).expect("it goes on");
+    (moves.0 - until) as f64 * 1e-9
+}
+
+#[test]
+fn a_pad_that_comes_back_repeats_its_self_test_before_the_arm_moves() {
+    let (end, engine, fastest) = comes_back("devices.skin.reconnect=true", Act::FramesToTheEnd);
+    assert_eq!(end, End::Duration);
+    let before = engine.halts().iter().find(|halt| is_lost(halt)).unwrap().fault.time;
+    assert!(fastest.iter().any(|(at, speed)| *at < before && *speed > 0.0), "it approaches");
+    // 20 frames, 10 ms apart; the first of them ends the loss.
+    let rest = rest_after(&engine, &fastest);
+    assert!(rest >= 0.18, "{rest} s");
+}
+
+#[test]
+fn without_reconnect_the_verdict_of_the_start_holds() {
+    let (end, engine, fastest) = comes_back("policy.device='hold'", Act::FramesToTheEnd);
+    assert_eq!(end, End::Duration);
+    let rest = rest_after(&engine, &fastest);
+    assert!(rest < 0.15, "{rest} s");
+}
+
+#[test]
+fn a_pad_that_is_touched_when_it_comes_back_ends_the_run_and_the_arm_stays() {
+    let (end, engine, fastest) = comes_back("devices.skin.reconnect=true", Act::LoadToTheEnd);
+    let End::Fault(fault) = end else { panic!("{end:?}") };
+    assert!(fault.to_string().contains("something touches the pad"), "{fault}");
+    let lost = engine.halts().iter().find(|halt| is_lost(halt)).expect("it was lost");
+    let until = lost.until.expect("it is back");
+    assert!(!fastest.iter().any(|(at, speed)| *at > until && *speed > 0.0), "nothing moves");
 }
 
 #[test]

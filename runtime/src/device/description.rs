@@ -3,8 +3,8 @@
 use std::borrow::Cow;
 use std::marker::PhantomData;
 
-use super::RoleType;
 use super::silence::{OnSilence, Silence};
+use super::{Again, RoleType};
 use crate::node::PortSpec;
 use crate::signal::{JointsShape, Kind, Shape, Signal, Unit};
 
@@ -42,6 +42,8 @@ pub struct Description {
     pub needs_commissioning: bool,
     /// Whether the bench lets the device come back after it was lost.
     pub(crate) may_return: bool,
+    /// Opens it once more; `None` if it was not opened from a bench.
+    pub(crate) again: Option<Again>,
     pub(crate) fills: Vec<Filled>,
     pub(crate) outputs: Vec<StatedPort>,
     pub(crate) commands: Vec<StatedPort>,

@@ -87,6 +87,14 @@ impl Samples {
         (sample.state, sample.loss) = (SampleState::Lost, why.into());
     }
 
+    /// Makes every port absent until it is written again, because the driver has ended.
+    pub(crate) fn lose_all(&mut self, why: &str) {
+        for sample in &mut self.ports {
+            sample.losses += u64::from(sample.state != SampleState::Lost);
+            (sample.state, sample.loss) = (SampleState::Lost, why.to_owned().into());
+        }
+    }
+
     /// Counts something for the summary of the run, as a plural noun: `"bad frames"`.
     pub fn count(&mut self, what: &'static str) {
         self.count_by(what, 1);

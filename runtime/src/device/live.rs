@@ -24,7 +24,7 @@ pub trait Live: Send {
     /// Runs until [`Link::stopped`], [`Link::finish`] or a failure. It runs on a thread of its own, so it stops nothing else if it blocks.
     ///
     /// # Errors
-    /// When the device fails; the run ends.
+    /// When the device fails. The run ends, unless the bench lets the device come back: then it is opened once more.
     async fn run(self: Box<Self>, link: Link) -> Result<(), DeviceError>;
 }
 
@@ -41,6 +41,8 @@ pub struct Link {
     /// Why the run has ended; empty while it runs.
     stop: watch::Receiver<String>,
     finished: Arc<AtomicBool>,
+    /// Whether the device must not be opened once more.
+    is_final: Arc<AtomicBool>,
     /// Whether it must send nothing.
     mute: Arc<AtomicBool>,
     /// The thread of the tick, which waits for samples.
@@ -190,6 +192,12 @@ impl Link {
         self.stop.borrow().clone()
     }
 
+    /// Keeps the device from being opened once more after this driver has ended with an error, where the bench says
+    /// `reconnect`: another attempt cannot help, or is not safe.
+    pub fn forbid_return(&self) {
+        self.is_final.store(true, Ordering::Release);
+    }
+
     /// Ends the run, because the device has no more samples. The driver can return after this.
     pub fn finish(&mut self) {
         self.finished.store(true, Ordering::Release);
@@ -205,6 +213,8 @@ pub(crate) struct Linked {
     commanded: Arc<Notify>,
     stop: watch::Sender<String>,
     finished: Arc<AtomicBool>,
+    /// Whether the device must not be opened once more.
+    is_final: Arc<AtomicBool>,
     /// Whether the driver must send nothing.
     mute: Arc<AtomicBool>,
     lease: Arc<LeaseState>,
@@ -248,8 +258,8 @@ pub(crate) fn start(name: &str, driver: Box<dyn Live>, setup: LinkSetup<'_>) -> 
     let cycle = period.min(silence / 4);
     let lease = Lease::new(commands.clone(), accelerations, cycle.as_nanos() as i64, silence.as_nanos() as i64);
     let shared = lease.shared();
-    let (published, commanded) = (Arc::new(AtomicU64::new(0)), Arc::new(Notify::new()));
-    let [finished, mute] = [false, is_mute].map(|is_so| Arc::new(AtomicBool::new(is_so)));
+    let (published, commanded) = (Arc::new(AtomicU64::new(samples.writes)), Arc::new(Notify::new()));
+    let [finished, is_final, mute] = [false, false, is_mute].map(|is_so| Arc::new(AtomicBool::new(is_so)));
     let link = Link {
         staging: samples.clone(),
         samples: samples_in,
@@ -261,6 +271,7 @@ pub(crate) fn start(name: &str, driver: Box<dyn Live>, setup: LinkSetup<'_>) -> 
         commanded: Arc::clone(&commanded),
         stop: stopping,
         finished: Arc::clone(&finished),
+        is_final: Arc::clone(&is_final),
         mute: Arc::clone(&mute),
         tick: std::thread::current(),
         epoch,
@@ -277,6 +288,7 @@ pub(crate) fn start(name: &str, driver: Box<dyn Live>, setup: LinkSetup<'_>) -> 
         commanded,
         stop,
         finished,
+        is_final,
         mute,
         lease: shared,
         epoch: 1,
@@ -369,6 +381,11 @@ impl Linked {
     /// Whether the device has no more samples.
     pub(crate) fn is_finished(&self) -> bool {
         self.finished.load(Ordering::Acquire)
+    }
+
+    /// Whether the driver has forbidden to open the device once more.
+    pub(crate) fn is_final(&self) -> bool {
+        self.is_final.load(Ordering::Acquire)
     }
 
     /// Whether the driver runs no more.

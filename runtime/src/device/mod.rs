@@ -17,6 +17,7 @@ mod silence;
 use std::borrow::Cow;
 use std::fmt;
 use std::marker::PhantomData;
+use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
 use crate::node::{Describe, Mistakes, Param, ParamSpec, PortSpec, Reader};
@@ -184,10 +185,26 @@ pub struct Opened {
     pub driver: Driver,
 }
 
+/// Opens a live device once more, with the parameters that it was opened with. `None` if it cannot be opened any more.
+#[derive(Clone)]
+pub(crate) struct Again(Arc<dyn Fn() -> Option<Box<dyn Live>> + Send + Sync>);
+
+impl Again {
+    pub(crate) fn open(&self) -> Option<Box<dyn Live>> {
+        (self.0)()
+    }
+}
+
+impl fmt::Debug for Again {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str("Again")
+    }
+}
+
 /// A device type. Its example adds it to a graph: `[roles]`, `[commands]`, `[bind]` and `[devices.…]`.
 pub trait Device: Describe + Sized + 'static {
-    /// The parameters in a bench file.
-    type Params: Param;
+    /// The parameters in a bench file. They are kept, to open a device once more whose driver has ended with an error.
+    type Params: Param + Clone + Send + Sync;
 
     /// Opens the device. A live device connects later, when it runs.
     ///
@@ -246,8 +263,14 @@ impl<D: Device> DeviceType for TypedDevice<D> {
     fn open(&self, table: &Value, reader: &mut Reader<'_>) -> Option<Opened> {
         let before = reader.mistakes.len();
         let params = D::Params::read(table, reader).filter(|_| reader.mistakes.len() == before)?;
-        match D::open(params) {
-            Ok(opened) => Some(opened),
+        match D::open(params.clone()) {
+            Ok(mut opened) => {
+                opened.description.again = Some(Again(Arc::new(move || match D::open(params.clone()).ok()?.driver {
+                    Driver::Live(driver) => Some(driver),
+                    Driver::Stepped(_) | Driver::Lockstep(_) => None,
+                })));
+                Some(opened)
+            }
             Err(mistakes) => {
                 reader.mistakes.extend(mistakes);
                 None

@@ -110,6 +110,8 @@ pub trait AnyNode: Any + Send {
     fn found(&self) -> Option<String> {
         None
     }
+    /// See [`Node::returned`].
+    fn returned(&mut self) {}
     /// See [`Node::uses`].
     fn uses(&self, wanted: &[Components]) -> Vec<Components> {
         let _ = wanted;
@@ -218,6 +220,10 @@ impl<N: Node> AnyNode for Cell<N> {
 
     fn found(&self) -> Option<String> {
         self.active.node.found(&self.state)
+    }
+
+    fn returned(&mut self) {
+        self.active.node.returned(&mut self.state);
     }
 
     fn uses(&self, wanted: &[Components]) -> Vec<Components> {

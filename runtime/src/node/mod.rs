@@ -148,6 +148,12 @@ pub trait Node: Describe + Sized + Send + 'static {
         None
     }
 
+    /// Forgets what held for the device behind an input: the bench lets this device come back (`reconnect`), and its
+    /// port was lost. The next sample may come from a device that was opened again. It must not allocate.
+    fn returned(&self, state: &mut Self::State) {
+        let _ = state;
+    }
+
     /// Runs one step. It must not block, allocate, log or read a clock. An output that it does not write becomes
     /// absent.
     fn step(&self, tick: &Tick, inputs: Self::Inputs<'_>, out: &mut Self::Outputs, state: &mut Self::State);

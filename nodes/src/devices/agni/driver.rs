@@ -94,6 +94,8 @@ impl Live for Agni {
             let why = format!("{}: {why}", self.name());
             self.pads.iter().for_each(|pad| link.lost(pad.image, why.clone()));
             if let Ended::Wrong(_) = ended {
+                // Another driver would not know the serial number of the device that was there.
+                link.forbid_return();
                 return Err(DeviceError(why));
             }
             link.count("reconnects");

@@ -4,6 +4,8 @@
 const MIN_CONTACT_NS: i64 = 40_000_000;
 /// A contact that lasts shorter than this is a first touch, after which a gap is a bounce and no loss [ns].
 const FIRST_TOUCH_NS: i64 = 1_000_000_000;
+/// A contact that comes back within this time goes on: it is no first touch [ns].
+const SAME_CONTACT_NS: i64 = 100_000_000;
 
 /// What a motion may do.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -36,7 +38,7 @@ pub struct Times {
 pub struct Course {
     /// When the flag was set that has been set since.
     set_since: Option<i64>,
-    /// When the last contact began that has lasted.
+    /// When the last contact began that has lasted. A gap of up to 100 ms does not end it.
     touched_since: Option<i64>,
     /// When that contact was first missing, if it has not come back.
     missing_since: Option<i64>,
@@ -50,7 +52,9 @@ impl Course {
         let lasts = self.set_since.is_some_and(|since| now - since >= MIN_CONTACT_NS);
         let flickers = touches && self.missing_since.is_some_and(|since| now - since <= times.debounce);
         if lasts && (self.touched_since.is_none() || self.missing_since.is_some()) {
-            *self = Self { touched_since: Some(now), missing_since: None, ..*self };
+            let is_same = self.missing_since.zip(self.set_since).is_some_and(|(end, set)| set - end <= SAME_CONTACT_NS);
+            let touched_since = self.touched_since.filter(|_| is_same).or(Some(now));
+            *self = Self { touched_since, missing_since: None, ..*self };
         } else if flickers {
             self.missing_since = None;
         }

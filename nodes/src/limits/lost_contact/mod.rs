@@ -30,7 +30,7 @@ pub use lead::lead;
 ///
 /// The wanted motion out of the object always passes. Once a contact has lasted for 40 ms again, everything does. Just
 /// after a first touch the pad may bounce: a contact that is lost within a second is searched at once, without a retreat
-/// and a rest.
+/// and a rest. A contact that comes back within 100 ms is the same contact, and no first touch.
 ///
 /// The lead is n · J (equilibrium - position) with the normal n of the pad, in the first tick without the contact: once it
 /// is given back, the spring brings the sensor to rest where the contact was lost. A contact or an image that is older than

@@ -130,6 +130,22 @@ fn a_flicker_is_no_loss_and_a_bounce_is_searched_at_once() {
 }
 
 #[test]
+fn a_contact_that_comes_back_soon_is_no_first_touch() {
+    let mut cell = Cell::new();
+    cell.run(2000.0, true, 0.003);
+    cell.run(60.0, false, 0.003);
+    cell.run(100.0, true, 0.003);
+    let after = cell.run(400.0, false, 0.003);
+    assert!(after.iter().all(|twist| !is_into_the_object(twist)), "the same contact is lost again: {after:?}");
+    let mut cell = Cell::new();
+    cell.run(2000.0, true, 0.003);
+    cell.run(900.0, false, 0.003);
+    cell.run(100.0, true, 0.003);
+    let after = cell.run(400.0, false, 0.003);
+    assert!(after[5..].iter().all(|twist| twist.linear().z > 0.0), "a new contact may bounce");
+}
+
+#[test]
 fn the_way_out_is_free_at_any_moment() {
     let mut cell = Cell::new();
     cell.run(2000.0, true, 0.003);

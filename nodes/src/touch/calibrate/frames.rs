@@ -46,6 +46,13 @@ pub(super) enum Frame {
     Stuck,
 }
 
+impl Frames {
+    /// Forgets the last frame. The number of frames that were dropped stays.
+    pub(super) fn forget(&mut self) {
+        *self = Self { dropped: self.dropped, ..Self::default() };
+    }
+}
+
 impl FrameRules {
     /// Returns the rules, or `None` if no sum and no peak is wired.
     pub(super) fn new(params: &Params, inputs: &InputsShapes) -> Result<Option<Self>, Mistake> {

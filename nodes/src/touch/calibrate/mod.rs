@@ -70,7 +70,8 @@ use tare::{Averages, Rules};
 /// A test that fails is repeated once. The second failure ends the task, and the fault names the tactels. `image` keeps
 /// the readings of bad tactels, with the zero that they had at rest: limiters read it. In `repaired`, a bad tactel is
 /// the mean of the live ones at its four sides: features read it. No tactel becomes bad after the test, so a pin that
-/// presses on one tactel for long is felt.
+/// presses on one tactel for long is felt. A pad that was lost and comes back, where the bench says `reconnect`, is
+/// tested again, with the calibrated zeros.
 ///
 /// ```toml
 /// [nodes.calibrate]
@@ -243,6 +244,13 @@ impl Node for Calibrate {
         let test = self.test.as_ref().map(|test| findings::describe(test, &self.unit.to_string(), &state.rest));
         let dropped = (state.frames.dropped > 0).then(|| format!("{} frames dropped as garbage", state.frames.dropped));
         test.into_iter().chain(dropped).reduce(|test, dropped| format!("{test}; {dropped}"))
+    }
+
+    fn returned(&self, state: &mut State) {
+        let Some(test) = &self.test else { return };
+        test.restart(&self.offset, &mut state.rest);
+        state.frames.forget();
+        self.rules.iter().for_each(|rules| rules.restart(&mut state.averages));
     }
 
     fn step(&self, tick: &Tick, inputs: Inputs<'_>, out: &mut Outputs, state: &mut State) {

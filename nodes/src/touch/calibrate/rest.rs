@@ -165,6 +165,16 @@ impl RestTest {
         }
     }
 
+    /// Begins a new test in place, with the calibrated zeros.
+    pub(super) fn restart(&self, zeros: &[f32], rest: &mut Rest) {
+        rest.verdict = Verdict::Testing;
+        rest.zeros.copy_from_slice(zeros);
+        rest.bad.clear();
+        (rest.bad_count, rest.noise, rest.shift) = (0, 0.0, 0.0);
+        (rest.has_noise, rest.is_second, rest.frames) = (false, false, 0);
+        rest.tactels.fill(Tactel::default());
+    }
+
     /// Adds a frame at rest. `is_dead` are the tactels that the calibration excludes. Returns whether this was the last
     /// one, so that there is a verdict.
     pub(super) fn add(&self, cells: &[f32], is_dead: impl Fn(usize) -> bool, rest: &mut Rest) -> bool {

@@ -57,6 +57,8 @@ pub(crate) struct Inlet {
     is_observed: bool,
     /// Whether the device is live, so that a sample can arrive too late.
     is_live: bool,
+    /// The runners of the nodes that hear of each loss of the port, because the bench lets the device come back.
+    pub(crate) returns: Box<[usize]>,
 }
 
 impl Inlet {
@@ -80,6 +82,7 @@ impl Inlet {
             losses: 0,
             is_observed: role.is_observed,
             is_live,
+            returns: Box::default(),
         }
     }
 
@@ -107,8 +110,15 @@ impl Inlet {
         (is_lost && !self.is_observed).then_some(&*sample.loss)
     }
 
-    /// Latches the pending sample, if there is one. Swaps the buffers instead of copying.
-    pub(crate) fn latch(&mut self, samples: &mut Samples, bus: &mut Bus, tick: u64, now: i64) {
+    /// Latches the pending sample, if there is one. Swaps the buffers instead of copying. Returns whether the device has
+    /// lost the port since the last latch.
+    pub(crate) fn latch(&mut self, samples: &mut Samples, bus: &mut Bus, tick: u64, now: i64) -> bool {
+        let was_lost = self.losses != samples.ports[self.port].losses;
+        self.take(samples, bus, tick, now);
+        was_lost
+    }
+
+    fn take(&mut self, samples: &mut Samples, bus: &mut Bus, tick: u64, now: i64) {
         let Samples { arenas, ports, .. } = samples;
         let sample = &ports[self.port];
         self.is_lost = matches!(sample.state, SampleState::Lost);

@@ -177,6 +177,11 @@ impl NodeRunner {
         self.node.found()
     }
 
+    /// Notes that a device behind the node was lost and may be opened again.
+    pub(crate) fn returned(&mut self) {
+        self.node.returned();
+    }
+
     /// Notes that the node panicked at `now` [ns]. It does not step before its reset.
     pub(crate) const fn set_panicked(&mut self, now: i64) {
         self.state = RunState::Panicked(now);

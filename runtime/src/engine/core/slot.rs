@@ -1,5 +1,7 @@
 //! A device in the engine: its samples, its commands and its link.
 
+use std::time::{Duration, Instant};
+
 use crate::device::{Commands, Description, Linked, Live, Samples, Stepped};
 
 /// A device with its exchange buffers.
@@ -12,9 +14,29 @@ pub(crate) struct DeviceSlot {
     pub(crate) link: DeviceLink,
     /// Why the device failed, if it has.
     pub(crate) failed: Option<String>,
+    /// How long a driver that ends with an error waits before it is started again.
+    pub(crate) pause: Duration,
+    /// Number of writes in the samples when the driver was started.
+    pub(crate) writes_at_start: u64,
 }
 
 impl DeviceSlot {
+    /// Shortest and longest time between the end of a driver and its next start.
+    pub(crate) const FIRST_PAUSE: Duration = Duration::from_millis(50);
+    const LONGEST_PAUSE: Duration = Duration::from_secs(2);
+
+    /// Notes that the driver has ended with an error, and when the device is opened once more. The pause doubles up to
+    /// two seconds, until a driver has written samples.
+    pub(crate) fn goes_down(&mut self, why: &str) {
+        let has_sampled = self.samples.writes != self.writes_at_start;
+        let pause = if has_sampled { Self::FIRST_PAUSE } else { self.pause };
+        self.pause = (2 * pause).min(Self::LONGEST_PAUSE);
+        self.samples.lose_all(why);
+        // The device has come to rest by itself, or does so now.
+        self.commands.rest();
+        self.link = DeviceLink::Down(Instant::now() + pause);
+    }
+
     /// Whether its commands are zero, and a live device has got them.
     pub(crate) fn rests(&self) -> bool {
         self.link.live().is_none_or(Linked::rests) && self.commands.are_zero()
@@ -29,6 +51,8 @@ pub(crate) enum DeviceLink {
     Idle(Box<dyn Live>),
     /// A live device that runs on its own.
     Live(Linked),
+    /// A live device whose driver has ended with an error. It is opened once more at that time.
+    Down(Instant),
     /// A device that has failed. The engine does not call it again.
     Gone,
 }

@@ -97,7 +97,9 @@ impl Core {
         for inlet in &mut self.inlets {
             let device = &mut devices[inlet.device];
             if device.failed.is_none() {
-                inlet.latch(&mut device.samples, &mut self.bus, self.tick.index, self.tick.now);
+                let was_lost = inlet.latch(&mut device.samples, &mut self.bus, self.tick.index, self.tick.now);
+                let returns = if was_lost { &*inlet.returns } else { &[] };
+                returns.iter().for_each(|runner| self.runners[*runner].returned());
             }
         }
     }

@@ -1,6 +1,6 @@
 //! Builds an engine from a plan. Everything that a tick uses is allocated here, once.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use super::engine::{DisplayedPort, Engine, Logged};
 use super::punctuality::Punctuality;
@@ -36,7 +36,11 @@ impl BusPorts {
             for (port, planned) in role.ports.iter().enumerate() {
                 let id = ports.add(PortRef { producer: Producer::Role(i), port }, planned);
                 let is_live = matches!(plan.devices[role.device].driver, Driver::Live(_));
-                inlets.push(Inlet::new(i, role, port, id, is_live));
+                let mut inlet = Inlet::new(i, role, port, id, is_live);
+                if plan.devices[role.device].description.may_return {
+                    inlet.returns = behind(plan, PortRef { producer: Producer::Role(i), port }, planned);
+                }
+                inlets.push(inlet);
             }
         }
         for (source, planned) in plan.nodes.iter().flat_map(PlannedNode::outputs) {
@@ -62,6 +66,21 @@ impl BusPorts {
     fn id(&self, source: PortRef) -> PortId {
         self.get(source).1
     }
+}
+
+/// Returns the runners of the nodes that read a port of a role, directly or through nodes that pass on the same kind: a
+/// flag that is computed from an image is not that image.
+fn behind(plan: &Plan, source: PortRef, port: &PlannedPort) -> Box<[usize]> {
+    let (kind, mut reached, mut runners) = (port.shape.kind(), BTreeSet::from([source]), Vec::new());
+    for (runner, node) in plan.nodes.iter().enumerate() {
+        let mut wires = node.inputs.iter().flat_map(|(_, wires)| wires);
+        if wires.any(|wire| reached.contains(&wire.source)) {
+            runners.push(runner);
+            let outputs = node.outputs().filter(|(_, output)| output.shape.kind() == kind);
+            reached.extend(outputs.map(|(source, _)| source));
+        }
+    }
+    runners.into()
 }
 
 impl Engine {
@@ -230,6 +249,8 @@ fn device_slot(
             Driver::Live(driver) => DeviceLink::Idle(driver),
         },
         failed: None,
+        pause: DeviceSlot::FIRST_PAUSE,
+        writes_at_start: 0,
     }
 }
 

@@ -414,7 +414,7 @@ impl Engine {
                     let is_newer = linked.receive(&mut device.samples);
                     has_sampled |= is_newer && self.schedule.is_clock(i);
                 }
-                DeviceLink::Idle(_) | DeviceLink::Live(_) | DeviceLink::Gone => {}
+                DeviceLink::Idle(_) | DeviceLink::Live(_) | DeviceLink::Down(_) | DeviceLink::Gone => {}
             }
         }
         has_sampled

@@ -201,7 +201,9 @@ impl Engine {
 
     /// Whether a device runs in real time.
     pub(super) fn is_live(&self) -> bool {
-        self.devices.iter().any(|device| matches!(device.link, DeviceLink::Idle(_) | DeviceLink::Live(_)))
+        let is_live =
+            |link: &DeviceLink| matches!(link, DeviceLink::Idle(_) | DeviceLink::Live(_) | DeviceLink::Down(_));
+        self.devices.iter().any(|device| is_live(&device.link))
     }
 
     /// Whether the samples of a stepped device end at a known time.

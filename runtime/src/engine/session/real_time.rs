@@ -79,6 +79,7 @@ impl Pacer for RealTimePacer {
             return Ok(false);
         }
         engine.collect_ended_drivers();
+        engine.restart_drivers(self.epoch);
         self.input.carry_out(engine, now);
         if self.is_real {
             engine.begin_measured(next + late, next);
