@@ -47,6 +47,10 @@ impl Guards<'_> {
     pub(super) fn check(&self, frames: &mut Frames<'_>) -> Vec<Diagnostic> {
         let (net, arm) = (self.net, self.wire.role);
         let Some(role) = net.roles[arm] else { return Vec::new() };
+        // What a limiter reads is unknown, and has a mistake of its own.
+        if self.path.iter().any(|stop| stop.spec.limits.guards.is_some() && is_unknown(net, stop.node)) {
+            return Vec::new();
+        }
         let (required, held) = (limits_of_sensors(net, role), self.follow(frames));
         let mut found = Vec::new();
         for sensor in sensors_on(net, arm) {
@@ -127,6 +131,19 @@ impl Guards<'_> {
         let help = format!("{}{other}", on_no_arm(&key.name, &kind.value));
         Diagnostic::new(Code::UnlimitedCommand, key.span.clone(), message).help(help)
     }
+}
+
+/// Returns whether a node, or one that it descends from, has an unknown type or lacks a wire.
+fn is_unknown(net: &Net<'_>, node: usize) -> bool {
+    let (mut seen, mut open) = (BTreeSet::from([node]), vec![node]);
+    while let Some(node) = open.pop() {
+        if net.spec(node).is_none() || net.lacks_wires(node) {
+            return true;
+        }
+        let sources = net.wires[node].iter().filter_map(|wire| wire.source.producer.node());
+        open.extend(sources.filter(|source| seen.insert(*source)));
+    }
+    false
 }
 
 /// A limiter may increase the motion toward the objects of sensors other than its own and that of the frame.
