@@ -188,7 +188,7 @@ mod tests {
     #[test]
     fn noise_without_coherence_is_no_answer() {
         let mut lines = lines(2.0, None, 0.0, 0.0);
-        lines.iter_mut().skip(5).for_each(|line| line.coherence = 0.5);
-        assert_eq!(fit(&lines, |_| Complex::from(1.0)), Err(5));
+        lines.iter_mut().skip(ENOUGH - 1).for_each(|line| line.coherence = 0.5);
+        assert_eq!(fit(&lines, |_| Complex::from(1.0)), Err(ENOUGH - 1));
     }
 }
