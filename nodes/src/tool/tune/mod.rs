@@ -380,7 +380,7 @@ fn answer(quantity: &str, fits: &[(&'static str, Fit)]) -> Answer {
     let Some((_, main)) = fits.first() else { return answer };
     answer.resonance_hz = main.resonance.map(|(hz, _)| page::rounded(hz));
     answer.damping_ratio = main.resonance.map(|(_, damping)| page::rounded(damping));
-    answer.latency_ms = Some(page::rounded(main.latency * 1e3));
+    answer.latency_ms = Some((main.latency * 1e4).round() / 10.0);
     answer
 }
 
