@@ -1,7 +1,7 @@
 //! `image_window`: the part of a region that is in a box.
 //!
 //! A tactel counts as a point: it is in the box if its centre is. Centres on the border are inside, to within
-//! [`MARGIN`] of the pitch, so that rounding does not decide.
+//! a millionth of the pitch, so that rounding does not decide.
 
 use std::ops::Range;
 
