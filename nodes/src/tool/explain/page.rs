@@ -137,19 +137,23 @@ fn loops(loops: &[Stability], style: &Style) -> String {
             .unwrap_or(std::cmp::Ordering::Equal)
     });
     if let Some((one, margins)) = worst.filter(|_| known.len() > 1) {
-        let over = one.object.as_ref().map(|object| format!(" over `{object}`")).unwrap_or_default();
         let how = if margins.is_stable { "the largest peak" } else { "it is not stable" };
-        let _ = writeln!(text, "The worst loop is that of `{}`{over}: {how}.", one.feature);
+        let _ = writeln!(text, "The worst loop is that of {}: {how}.", place(one));
     }
     for one in loops.iter().filter(|one| one.margins.is_none()) {
-        let over = one.object.as_ref().map(|object| format!(" over `{object}`")).unwrap_or_default();
         let _ = writeln!(
             text,
-            "No margins of `{}`{over}: the bench does not say how it answers. `tactflow tune` measures it.",
-            one.feature
+            "No margins of {}: the bench does not say how it answers. `tactflow tune` measures it.",
+            place(one)
         );
     }
     text
+}
+
+/// Names a loop: its feature, and the object if the bench names one.
+fn place(one: &Stability) -> String {
+    let over = one.object.as_ref().map(|object| format!(" over `{object}`")).unwrap_or_default();
+    format!("`{}`{over}", one.feature)
 }
 
 fn margins(one: &Stability) -> Option<[String; 9]> {
