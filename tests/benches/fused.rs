@@ -196,7 +196,7 @@ impl Fused {
         }
         let tick = Tick { dt: tick, max_gap: 0.5, ..Tick::first() };
         let mut velocity = [0.0; 7];
-        let moves = self.limit(wanted, &pose, &tick).map(|twist| self.solve(&twist, &pose, arm[0], &mut velocity));
+        let moves = self.limit(wanted, &pose, &tick).map(|twist| self.solve(&twist, &pose, arm, &mut velocity));
         let wanted = moves.map(|()| &velocity[..]);
         self.limited.limit(&self.joints, 0.6, &tick, wanted, arm[0], arm[1]);
         out.copy_from_slice(self.limited.velocities());
@@ -256,7 +256,7 @@ impl Fused {
     }
 
     /// From a twist of the sensor to joint velocities.
-    fn solve(&mut self, twist: &Twist, Pose(pose): &Pose, q: &[f64], out: &mut [f64; 7]) {
+    fn solve(&mut self, twist: &Twist, Pose(pose): &Pose, [q, equilibrium]: [&[f64]; 2], out: &mut [f64; 7]) {
         let spatial = adjoint(&Pose(*pose), twist);
         let r = pose.rotation.matrix();
         let p = pose.translation.vector;
@@ -273,7 +273,8 @@ impl Fused {
         let nearness = damped::solve(&self.at_sensor, &at_sensor(&spatial), 0.02, out);
         let mut drift: [f64; 7] = std::array::from_fn(|i| 0.5 * (POSTURE[i] - q[i]));
         null_space::project(&self.at_sensor, &mut self.rows, &mut drift);
-        let is_within = joint_limits::add_within(&self.joints, q, 0.2, out, &drift);
+        let places = q.iter().zip(equilibrium).map(|(q, equilibrium)| [*q, *equilibrium]);
+        let is_within = joint_limits::add_within(&self.joints, places, 0.2, out, &drift);
         assert!(is_within && nearness.damping == 0.0, "the task stays far from limits and singularities");
     }
 

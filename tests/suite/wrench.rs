@@ -2,7 +2,7 @@
 
 use tactflow_runtime::engine::Engine;
 use tactflow_runtime::graph::{Request, compile};
-use tactflow_runtime::signal::Scalar;
+use tactflow_runtime::signal::{Pose, Scalar};
 use tactflow_runtime::source::Code;
 use tactflow_tests::{catalogue, workspace};
 
@@ -103,4 +103,44 @@ fn a_bench_with_a_sensor_of_the_force_needs_the_limit_in_each_task() {
     // Without the sensor nothing asks for it.
     own.bench_text = own.bench_text.map(|text| text.replace("force = 'bench'\n", ""));
     assert!(compile(&catalogue(), &own).is_ok());
+}
+
+/// Where the far end of the tool is: in the frame of the tip, which is 30 mm behind the pad [m].
+const END: [f64; 3] = [0.15, 0.0, -0.03];
+
+/// Lets the tool move along x of its pad, on an arm of this stiffness and with more lines of the bench. Returns how far the surface of its end gets along
+/// the x that the pad has at the start [m], and that x with the place of the pad at the start.
+fn reach(stiffness: f64, bench: &str) -> (f64, [nalgebra::Vector3<f64>; 2]) {
+    let mut request = toward_wall(0.05, stiffness, bench);
+    let cut = |text: String| text.replace("force = 'bench'\n", "").replace("at = [0.19,", "at = [0.9,");
+    request.bench_text = request.bench_text.map(cut);
+    let plan = compile(&catalogue(), &request).unwrap_or_else(|report| panic!("{}", report.render(false)));
+    let (mut engine, mut start, mut farthest) = (Engine::new(plan), None, f64::NEG_INFINITY);
+    while let Some(next) = engine.next() {
+        engine.tick(next).unwrap_or_else(|fault| panic!("{fault}"));
+        let Some(Pose(pose)) = engine.get::<Pose>("move.state.sensor_pose") else { continue };
+        let place = pose.translation.vector;
+        let [x, from] = *start.get_or_insert([pose.rotation * nalgebra::Vector3::x(), place]);
+        let end = place + pose.rotation * nalgebra::Vector3::from(END);
+        farthest = farthest.max(x.dot(&(end - from)) + 0.02);
+    }
+    (farthest, start.expect("the arm states its joints"))
+}
+
+#[test]
+fn the_end_of_the_tool_stops_before_a_plane() {
+    let capsule = "[facts.arm]\ncapsule = { ends_m = [[0.0, 0.0, 0.0], [0.15, 0.0, 0.0]], radius_m = 0.02 }\n";
+    // Without a plane, the end moves from 170 mm on.
+    let (free, [x, from]) = reach(200.0, "");
+    assert!(free > 0.3, "it gets {free} m far");
+    // A plane 200 mm before the pad, across its x. n points to the free side.
+    let (n, d) = (-x, -(x.dot(&from) + 0.2));
+    let plane = format!("keep_out = [[{:?}, {:?}, {:?}, {d:?}]]\n", n.x, n.y, n.z);
+    // When its equilibrium brakes, a compliant arm swings on, by the speed times the root of mass and stiffness.
+    for (stiffness, swing) in [(20_000.0, 0.0005), (200.0, 0.003)] {
+        let (guarded, _) = reach(stiffness, &format!("{plane}{capsule}"));
+        assert!((0.195..0.2 + swing).contains(&guarded), "the surface of the end gets {guarded} m far");
+    }
+    let (bare, _) = reach(200.0, &plane);
+    assert!(bare > 0.3, "without a capsule only the pad stays before the plane: {bare} m");
 }

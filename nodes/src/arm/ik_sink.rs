@@ -61,6 +61,7 @@ const SOFTNESS: f64 = 0.2;
 /// in.sensor_pose = "state.sensor_pose"
 /// in.jacobian = "state.jacobian"
 /// in.joints = "state.joints"
+/// in.equilibrium = "arm.equilibrium"
 /// posture = { from = "arm.home", optional = true }   # [rad]
 /// ```
 #[derive(Describe)]
@@ -106,6 +107,10 @@ pub struct Inputs<'a> {
     /// Joint positions with their limits; those of prismatic joints are in m.
     #[port(unit = "rad", robot = "R", quantity = "position")]
     joints: In<'a, Joints>,
+    /// Posture that the commands have moved to; without it, the joint positions. The ranges of the joints hold for both,
+    /// as those of `joint_limit` do.
+    #[port(unit = "rad", robot = "R", quantity = "equilibrium", optional)]
+    equilibrium: Option<In<'a, Joints>>,
 }
 
 /// What `ik_sink` writes.
@@ -181,6 +186,8 @@ impl Node for IkSink {
         let State { columns, drift, sharing } = state;
         let velocity = &mut out.velocity.write().0;
         let q = &inputs.joints.0;
+        let equilibrium = inputs.equilibrium.as_ref().map_or(q, |equilibrium| &equilibrium.value().0);
+        let places = || q.iter().zip(equilibrium).map(|(q, equilibrium)| [*q, *equilibrium]);
         // A copy, so that it stays in registers while the columns are written.
         let pose = *inputs.sensor_pose.value();
         for (column, of_base) in columns.iter_mut().zip(&inputs.jacobian.0) {
@@ -197,9 +204,11 @@ impl Node for IkSink {
         let limited = &mut out.limited.write().0;
         limited.fill(0.0);
         let (mut share, mut lost) = (1.0, [0.0; 6]);
-        if nearness.damping > 0.0 || !joint_limits::add_within(&self.joints, q, self.limit_delay, velocity, drift) {
-            for (room, (joint, q)) in sharing.elbow.intervals.iter_mut().zip(self.joints.iter().zip(q)) {
-                *room = interval(joint, *q, self.limit_delay);
+        if nearness.damping > 0.0
+            || !joint_limits::add_within(&self.joints, places(), self.limit_delay, velocity, drift)
+        {
+            for (room, (joint, place)) in sharing.elbow.intervals.iter_mut().zip(self.joints.iter().zip(places())) {
+                *room = interval(joint, place, self.limit_delay);
             }
             sharing.mark(velocity, drift, limited);
             sharing.share_out(&self.joints, columns, &twist, nearness, self.params.damping, velocity);

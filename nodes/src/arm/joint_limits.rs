@@ -18,26 +18,36 @@ pub type Interval = (f64, f64);
 /// along a limit [1].
 const NEGLIGIBLE: f64 = 1e-9;
 
-/// Returns the smallest and the largest velocity of a joint at position `q`.
+/// Where a joint is and where its equilibrium is [rad]. The limits hold for both.
+pub type Place = [f64; 2];
+
+/// Returns the smallest and the largest velocity of a joint at a place.
 ///
 /// Toward a limit at distance d it is the v of v τ + v²/(2a) = d, with the `delay` τ [s] and the acceleration a of the
 /// joint. Near the limit that is d/τ, with which it is approached exponentially and never crossed. It brakes with
 /// v dv/dd = a v/(a τ + v), which is less than a at any distance. A joint outside its range can only move back.
 #[must_use]
-pub fn interval(joint: &Joint, q: f64, delay: f64) -> Interval {
+pub fn interval(joint: &Joint, [q, equilibrium]: Place, delay: f64) -> Interval {
     let toward = |distance: f64| stopping_speed(distance, joint.acceleration, delay).min(joint.speed);
-    (-toward(q - joint.lower), toward(joint.upper - q))
+    (-toward(q.min(equilibrium) - joint.lower), toward(joint.upper - q.max(equilibrium)))
 }
 
-/// Adds `drift` to `velocity` [rad/s] if the sum is within the intervals of all joints at the positions `q`. Returns
+/// Adds `drift` to `velocity` [rad/s] if the sum is within the intervals of all joints at their places. Returns
 /// whether it is.
 ///
 /// It asks whether a stop is possible, v τ + v²/(2a) <= d, which is cheaper than the largest speed from which one is.
-pub fn add_within(joints: &[Joint], q: &[f64], delay: f64, velocity: &mut [f64], drift: &[f64]) -> bool {
+pub fn add_within(
+    joints: &[Joint],
+    places: impl Iterator<Item = Place>,
+    delay: f64,
+    velocity: &mut [f64],
+    drift: &[f64],
+) -> bool {
     let mut is_within = true;
-    for (((joint, q), v), drift) in joints.iter().zip(q).zip(&*velocity).zip(drift) {
+    for (((joint, [q, equilibrium]), v), drift) in joints.iter().zip(places).zip(&*velocity).zip(drift) {
         let sum = v + drift;
-        let (speed, room) = (sum.abs(), if sum > 0.0 { joint.upper - q } else { q - joint.lower });
+        let (speed, room) =
+            (sum.abs(), if sum > 0.0 { joint.upper - q.max(equilibrium) } else { q.min(equilibrium) - joint.lower });
         is_within &= speed <= joint.speed && speed * (delay + speed / (2.0 * joint.acceleration)) <= room;
     }
     if is_within {

@@ -221,7 +221,7 @@ proptest! {
         rig.step();
         let got = velocity(&rig);
         for ((v, joint), q) in got.iter().zip(chain.joints()).zip(q) {
-            let (min, max) = interval(joint, q, 0.2);
+            let (min, max) = interval(joint, [q; 2], 0.2);
             prop_assert!(*v >= min - 1e-12 && *v <= max + 1e-12, "{}: {} not in {}..{}", joint.name, v, min, max);
         }
         let produced: [f64; 6] = at_sensor(&pose, &Twist(twist_of(&columns, &got)));
@@ -337,4 +337,31 @@ fn a_bad_parameter_is_a_mistake() {
     ];
     let mistakes = NodeRig::new::<IkSink>("", &wires).err().unwrap();
     assert_eq!(mistakes[0].at, At::Input("jacobian".into()));
+}
+
+#[test]
+fn an_equilibrium_at_its_limit_does_not_stop_the_arm() {
+    let chain = lwr();
+    let equilibrium_of = chain.joints().iter().map(|joint| joint.clone());
+    let joints = JointsShape { joints: equilibrium_of.collect(), unit: Unit::RADIAN };
+    let wires = wires().into_iter().chain([("equilibrium", joints.into())]).collect::<Vec<_>>();
+    let mut rig = NodeRig::new::<IkSink>("", &wires).unwrap();
+    let columns = set_arm(&mut rig, &chain, &BENT);
+    let pose = chain.forward(&BENT, &mut columns.clone());
+    // The spring of a held arm: one joint after the other has run ahead to its upper limit, the measured one has not.
+    for i in 0..7 {
+        let mut ahead = BENT;
+        ahead[i] = chain.joints()[i].upper;
+        rig.set("equilibrium", Joints(ahead.to_vec().into()));
+        for twist in
+            [[0.0, 0.0, -0.02, 0.0, 0.0, 0.0], [0.01, 0.0, 0.0, 0.0, 0.0, 0.0], [0.0, 0.01, 0.01, 0.0, 0.1, 0.0]]
+        {
+            rig.set("twist", spatial(&pose, twist));
+            rig.step();
+            let got = velocity(&rig);
+            assert!(got[i] <= 0.0, "joint {i} runs on at {} rad/s", got[i]);
+            let share = *rig.get::<f64>("share").unwrap();
+            assert!(share > 0.4, "joint {i} leaves {share} of {twist:?}");
+        }
+    }
 }

@@ -45,13 +45,13 @@ fn the_interval_of_a_joint_depends_on_its_position() {
         (f64::NAN, (0.0, 0.0), "not a number"),
     ];
     for (q, (min, max), what) in cases {
-        let got = interval(&unknown, q, 0.25);
+        let got = interval(&unknown, [q; 2], 0.25);
         assert!((got.0 - min).abs() < 1e-12 && (got.1 - max).abs() < 1e-12, "{what}: {got:?}");
     }
     // A stop from v takes v τ + v²/(2a) = v/4 + v²/8 with 4 rad/s².
     let slow = Joint { acceleration: 4.0, ..unknown };
     for (distance, speed) in [(0.12, 0.4), (0.375, 1.0), (1.0, 2.0), (1.875, 3.0), (2.5, 3.0)] {
-        let got = interval(&slow, 2.0 - distance, 0.25).1;
+        let got = interval(&slow, [2.0 - distance; 2], 0.25).1;
         assert!((got - speed).abs() < 1e-12, "at {distance}: {got}");
     }
 }
@@ -70,9 +70,12 @@ fn a_sum_is_added_if_each_joint_can_stop() {
         ([0.0, 0.0], [0.0, 1.0], [0.0, 1.0], true, "as fast as possible"),
         ([f64::NAN, 0.0], [0.1, 0.0], [0.0, 0.0], false, "not a number"),
     ];
+    let ahead = add_within(&joints, [[0.0, 0.62], [0.0; 2]].into_iter(), 0.25, &mut [0.5, 0.0], &[0.5, 0.0]);
+    let too_far = add_within(&joints, [[0.0, 0.63], [0.0; 2]].into_iter(), 0.25, &mut [0.5, 0.0], &[0.5, 0.0]);
+    assert_eq!((ahead, too_far), (true, false), "the equilibrium counts too");
     for (q, mut velocity, drift, is_within, what) in cases {
         let before = velocity;
-        assert_eq!(add_within(&joints, &q, 0.25, &mut velocity, &drift), is_within, "{what}");
+        assert_eq!(add_within(&joints, q.iter().map(|q| [*q; 2]), 0.25, &mut velocity, &drift), is_within, "{what}");
         let part = f64::from(u8::from(is_within));
         assert_eq!(velocity, [before[0] + part * drift[0], before[1] + part * drift[1]], "{what}");
     }
@@ -85,7 +88,7 @@ proptest! {
         distance in 1e-3..3.0f64, gain in 0.5..20.0f64, acceleration in 0.5..40.0f64,
     ) {
         let joint = Joint { acceleration, ..joint(-9.0, 9.0, 50.0) };
-        let speed = |distance: f64| interval(&joint, 9.0 - distance, 1.0 / gain).1;
+        let speed = |distance: f64| interval(&joint, [9.0 - distance; 2], 1.0 / gain).1;
         let step = 1e-6;
         let braking = speed(distance) * (speed(distance + step) - speed(distance - step)) / (2.0 * step);
         prop_assert!(braking <= acceleration * (1.0 + 1e-6), "{} at {}", braking, distance);

@@ -1,14 +1,16 @@
 //! `joint_limit`: the last node before the arm.
 
+mod following;
 mod joints;
 mod limiter;
 
-use tactflow_runtime::node::{Describe, In, Inputs, Limits, Mistakes, Node, Out, Outputs, Param, Setup, Tick};
-use tactflow_runtime::signal::{Joint, Joints, JointsShape, Scalar, Stamp, Unit};
+use tactflow_runtime::node::{Describe, In, Inputs, Limits, Mistakes, Node, Out, Outputs, Param, Setup, State, Tick};
+use tactflow_runtime::signal::{Flag, Joint, Joints, JointsShape, Scalar, Stamp, Unit};
 
 use super::{fraction, max_age};
 use crate::usual::{USUAL_LEAD_RAD, USUAL_RAD_PER_S2};
 
+use following::Following;
 use joints::joints;
 pub use limiter::Limiter;
 
@@ -34,7 +36,11 @@ pub use limiter::Limiter;
 /// slow graph this leaves little speed near a bound: use a shorter `max_gap_ms`. An arm that is moved by hand can leave
 /// its range.
 ///
-/// Each output beside the velocity is 1 while the limit of that name does not act.
+/// **A joint that does not follow** ends the task with a fault, because its motion is no longer the one that the limiters
+/// before it have let pass. The equilibrium must move as the commands say: a joint that was told more than 4 mrad and has
+/// made less than a quarter of it for 300 ms is stuck. The commands must act within 100 ms.
+///
+/// Each scalar beside the velocity is 1 while the limit of that name does not act.
 ///
 /// ```toml
 /// [nodes.joint_limit]
@@ -106,17 +112,27 @@ pub struct Outputs {
     /// Fraction of the wanted change that the accelerations of the joints let pass in this tick.
     #[port(unit = "1", frame = "_")]
     joint_acceleration: Out<Scalar>,
+    /// Whether a joint has not followed its commands.
+    stuck: Out<Flag>,
+}
+
+/// What `joint_limit` remembers.
+#[derive(State)]
+pub struct State {
+    limiter: Limiter,
+    following: Following,
 }
 
 impl Node for JointLimit {
     type Params = Params;
     type Inputs<'a> = Inputs<'a>;
     type Outputs = Outputs;
-    type State = Limiter;
+    type State = State;
 
     const LIMITS: Limits = Limits {
         through: Some("velocity"),
         holds: &["lead", "joint_position", "joint_speed", "joint_acceleration"],
+        fails: Some("stuck"),
         ..Limits::NONE
     };
 
@@ -132,17 +148,31 @@ impl Node for JointLimit {
         Ok(Self { joints, lead: params.lead_rad, max_age: max_age("velocity"), max_age_of_arm })
     }
 
-    fn state(&self) -> Limiter {
-        Limiter::new(self.joints.len())
+    fn state(&self) -> State {
+        let count = self.joints.len();
+        State { limiter: Limiter::new(count), following: Following::new(count) }
     }
 
-    fn step(&self, tick: &Tick, inputs: Inputs<'_>, out: &mut Outputs, limiter: &mut Limiter) {
+    fn found(&self, state: &State) -> Option<String> {
+        let (joint, [told, way]) = state.following.stuck()?;
+        let name = &self.joints[joint].name;
+        Some(format!(
+            "joint `{name}` does not follow its commands: it was told {told:.4} rad and has moved {way:.4} rad"
+        ))
+    }
+
+    fn step(&self, tick: &Tick, inputs: Inputs<'_>, out: &mut Outputs, State { limiter, following }: &mut State) {
         let arm = inputs.position.stamp().oldest(inputs.equilibrium.stamp());
         let is_fresh = |stamp: Stamp, max_age: i64| stamp.age(tick.now) <= max_age && !tick.is_halted;
         let is_arm_fresh = is_fresh(arm, self.max_age_of_arm);
         let wanted = inputs.velocity.filter(|velocity| is_arm_fresh && is_fresh(velocity.stamp(), self.max_age));
         let wanted = wanted.map(|velocity| &*velocity.value().0);
         let (position, equilibrium) = (&inputs.position.0, &inputs.equilibrium.0);
+        if is_arm_fresh {
+            out.stuck.set(following.note(tick, limiter.velocities(), equilibrium));
+        } else {
+            following.pause();
+        }
         let Some([lead, position, speed, acceleration]) =
             limiter.limit(&self.joints, self.lead, tick, wanted, position, equilibrium)
         else {

@@ -316,3 +316,57 @@ fn bad_settings() {
     }
     assert!(NodeRig::new::<JointLimit>("lead_rad = 0.1\nacceleration = 5.0", &unknown).is_ok());
 }
+
+/// Tells an arm of two joints `told` [rad/s] for `seconds`, while the joints follow with these parts of it, `lag` ticks
+/// late. Returns when a joint is found stuck [s], and what is said.
+fn found(told: impl Fn(f64) -> [f64; 2], parts: [f64; 2], lag: usize, seconds: f64) -> Option<(f64, String)> {
+    let mut rig = rig("lead_rad = 10.0", &[50.0, 50.0]);
+    let mut equilibrium = [0.0; 2];
+    let mut on_their_way = std::collections::VecDeque::from(vec![[0.0; 2]; lag]);
+    for tick in 0..(seconds * 250.0) as i64 {
+        place(&mut rig, &equilibrium, &equilibrium);
+        rig.set("velocity", joints(&told(tick as f64 * 0.004)));
+        rig.step_ms(4.0);
+        if rig.get::<Flag>("stuck").is_some_and(|stuck| *stuck) {
+            return Some((tick as f64 * 0.004, rig.found().expect("it says which")));
+        }
+        let command = velocity(&rig).map_or([0.0; 2], |velocity| [velocity[0], velocity[1]]);
+        on_their_way.push_back(command);
+        let acts = on_their_way.pop_front().expect("one was just added");
+        for i in 0..2 {
+            equilibrium[i] += parts[i] * acts[i] * 0.004;
+        }
+    }
+    None
+}
+
+#[test]
+fn a_joint_that_does_not_follow_its_commands_is_found() {
+    let steady = |_| [0.02, 0.1];
+    // 0.004 rad take 0.04 s at 0.1 rad/s; then 300 ms.
+    let (at, why) = found(steady, [1.0, 0.0], 0, 2.0).unwrap();
+    assert!((0.33..0.37).contains(&at), "{at} s");
+    assert!(why.starts_with("joint `j1` does not follow its commands: it was told 0.0"), "{why}");
+    let (at, why) = found(steady, [0.0, 1.0], 0, 2.0).unwrap();
+    assert!((0.48..0.52).contains(&at) && why.contains("`j0`"), "{at} s, {why}");
+    // A creep is found too: 0.004 rad at 0.001 rad/s.
+    let (at, _) = found(|_| [0.001, 0.0], [0.0, 1.0], 0, 10.0).unwrap();
+    assert!((4.25..4.45).contains(&at), "{at} s");
+    // One that runs the wrong way does not follow.
+    assert!(found(steady, [1.0, -1.0], 0, 2.0).is_some());
+}
+
+#[test]
+fn joints_that_follow_are_never_found_stuck() {
+    let sine = |f: f64| move |t: f64| [0.3 * (std::f64::consts::TAU * f * t).sin(), 0.05];
+    for lag in [0, 1, 10, 25] {
+        for frequency in [0.2, 0.5, 1.0, 2.0, 5.0, 12.0] {
+            assert_eq!(found(sine(frequency), [1.0, 1.0], lag, 10.0), None, "{lag} ticks late at {frequency} Hz");
+        }
+        let square = |t: f64| if t % 1.0 < 0.5 { [0.7, 0.0] } else { [-0.7, 0.1] };
+        assert_eq!(found(square, [1.0, 1.0], lag, 10.0), None, "{lag} ticks late");
+    }
+    // A robot that somebody has slowed down follows slowly.
+    assert_eq!(found(|_| [0.01, 0.1], [0.3, 0.3], 2, 2.0), None);
+    assert_eq!(found(|_| [0.0, 0.0], [0.0, 0.0], 0, 2.0), None, "a joint that is told nothing");
+}

@@ -3,7 +3,7 @@
 /// How long a contact must last to count as one [ns].
 const MIN_CONTACT_NS: i64 = 40_000_000;
 /// A contact that lasts shorter than this is a first touch, after which a gap is a bounce and no loss [ns].
-const FIRST_TOUCH_NS: i64 = 1_000_000_000;
+const FIRST_TOUCH_NS: i64 = 500_000_000;
 /// A contact that comes back within this time goes on: it is no first touch [ns].
 const SAME_CONTACT_NS: i64 = 100_000_000;
 

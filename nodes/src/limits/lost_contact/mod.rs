@@ -29,7 +29,7 @@ pub use lead::lead;
 ///    than `search_m_per_s`.
 ///
 /// The wanted motion out of the object always passes. Once a contact has lasted for 40 ms again, everything does. Just
-/// after a first touch the pad may bounce: a contact that is lost within a second is searched at once, without a retreat
+/// after a first touch the pad may bounce: a contact that is lost within half a second is searched at once, without a retreat
 /// and a rest. A contact that comes back within 100 ms is the same contact, and no first touch.
 ///
 /// The lead is n · J (equilibrium - position) with the normal n of the pad, in the first tick without the contact: once it
@@ -63,7 +63,7 @@ pub struct Params {
     #[param(unit = "ms", range = 0.001..=1000.0, default = 20.0)]
     debounce_ms: f64,
     /// Time from the first tick without the contact until the arm searches.
-    #[param(unit = "ms", range = 0.0..=60000.0, default = 500.0)]
+    #[param(unit = "ms", range = 0.0..=60000.0, default = 600.0)]
     wait_ms: f64,
     /// Speed at which the lead is given back.
     #[param(unit = "m/s", above = 0.0, usual = ..=USUAL_M_PER_S, default = 0.02)]

@@ -24,6 +24,10 @@ pub(super) fn describe(test: &RestTest, unit: &str, rest: &Rest) -> String {
              it is stuck; start the sensor again"
                 .to_owned()
         }
+        Verdict::Sunk => format!(
+            "the readings of the whole pad have sunk below their zeros, by more than {bound} {unit} in the mean: forces \
+             read too small; lift the pad off, and start again for new zeros"
+        ),
         Verdict::TooManyBad => {
             let count = rest.bad_count;
             format!(

@@ -45,7 +45,8 @@ use tare::{Averages, Rules};
 /// reading above `max_reading` is dropped, and one whose sum changes by more than `max_rise`. The frame after that one
 /// counts, so that an impact costs one frame. A pad whose self-test saw noise never sends one image three times in a
 /// row: then the images are absent, and after 25 such frames the task ends with a fault. A pad that repeats its readings
-/// at rest may repeat them.
+/// at rest may repeat them. A pad whose zero sinks hides a force: with a self-test and a `tare_bound`, the task ends with
+/// a fault if the mean of all readings is below that of the zeros by more than the bound, in 10 frames in a row.
 ///
 /// **Tare.** The zero of foam drifts. When `in.tare` becomes set, the mean of the next `tare_window` frames becomes the
 /// zero of each tactel; with `tare_at_start` the mean of the first frames does. A pad is only tared while nothing
@@ -264,11 +265,11 @@ impl Node for Calibrate {
             self.rules.iter().for_each(|rules| rules.restart(&mut state.averages));
         }
         let frame = match &self.frames {
-            Some(rules) if image.is_new() => rules.judge(&inputs, state.rest.has_noise, &mut state.frames),
+            Some(rules) if image.is_new() => rules.judge(&inputs, &state.rest, &mut state.frames),
             _ => Frame::Good,
         };
-        if frame == Frame::Stuck && state.rest.verdict == Verdict::Passed {
-            state.rest.verdict = Verdict::Stuck;
+        if let Frame::Last(verdict) = frame {
+            state.rest.verdict = verdict;
             out.failed.set(true);
         }
         if frame != Frame::Good || state.rest.verdict != Verdict::Passed && !self.passes(image, out, state) {

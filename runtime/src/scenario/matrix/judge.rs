@@ -32,7 +32,8 @@ pub struct Attack {
 /// What a compliant arm gives way under a force at its ceiling [m]: 15 N at 3 kN/m.
 const GIVE_M: f64 = 0.005;
 /// How long a contact must have lasted before its end is a loss, and how long a loss takes to be seen [s]. A pad may
-/// bounce for 1 s, which counts from when it has seen the contact for 40 ms.
+/// bounce for 0.5 s, which counts from when it has seen the contact for 40 ms after the last bounce. A contact that comes back later than a
+/// loss takes to be seen is a new one, and may bounce again.
 const HELD_S: f64 = 1.1;
 const SEEN_S: f64 = 0.1;
 /// How long an arm rests after a loss at least, and how fast it then searches at most [s, m/s].
@@ -145,14 +146,14 @@ fn push_after_loss(side: &Side, i: usize, moments: &[Moment], [at, seen]: [f64; 
     let (mut begin, mut end): (Option<f64>, Option<f64>) = (None, None);
     for moment in moments {
         if moment.sides[i].force > 0.0 {
-            begin.get_or_insert(moment.time);
+            let is_same = end.is_some_and(|end| moment.time - end < SEEN_S);
+            begin = begin.filter(|_| is_same).or(Some(moment.time));
             end = Some(moment.time);
             continue;
         }
         let (Some(from), Some(lost)) = (begin, end) else { continue };
         let since = moment.time - lost;
         if lost - from < HELD_S || lost < at {
-            begin = begin.filter(|_| since < SEEN_S);
             continue;
         }
         let is_told = moment.commands.iter().any(|command| *command != 0.0);
@@ -279,6 +280,19 @@ mod tests {
             broken("lost commands", Phase::Steady, &standing)
                 .contains(&"the run has ended without a named cause".to_owned())
         );
+    }
+
+    #[test]
+    fn a_contact_that_comes_back_is_a_new_one_and_a_flicker_is_not() {
+        let judged = |touches: &dyn Fn(f64) -> bool, into: f64| {
+            let creeps = |time: f64| if time < into { 0.0 } else { 0.005_f64.min((time - into) * 0.9) };
+            broken("object gone", Phase::Steady, &run(|time| if touches(time) { 4.0 } else { 0.0 }, creeps))
+        };
+        let back_for = |seconds: f64| move |time: f64| time < 2.0 || (3.0..3.0 + seconds).contains(&time);
+        assert_eq!(judged(&back_for(0.3), 3.35), [""; 0], "a short contact may bounce");
+        assert!(judged(&back_for(1.2), 4.35)[0].contains("into the void, 0.1"), "one that has lasted is lost");
+        let flickers = |time: f64| time < 2.0 || (2.05..2.2).contains(&time);
+        assert!(judged(&flickers, 2.35)[0].contains("into the void, 0.1"), "the same contact");
     }
 
     #[test]

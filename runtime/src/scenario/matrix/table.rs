@@ -70,8 +70,8 @@ impl Fate {
 enum Allowance {
     /// The pad reads this fraction of the force, so the ceiling is that much higher.
     OverGain,
-    /// A hand presses with this force.
-    Force,
+    /// A hand moves the arm with this force: its spring and its mass then throw the pad at the object.
+    Throw,
     /// The object moves at this speed: its hit is the speed times the root of stiffness and mass.
     Hit,
 }
@@ -116,13 +116,22 @@ pub(super) static TABLE: LazyLock<Table> =
 const TOUCH_N: f64 = 6.0;
 /// The root of stiffness and mass, of 77 kN/m of foam under the whole pad and of 3 kg [N s/m].
 const HIT_N_S_PER_M: f64 = 480.0;
+/// How much larger a hit is than the push behind it [1]. A push F on an arm of stiffness k and mass m, or its end, gives
+/// the pad the speed F / √(k m), and a foam of stiffness c stops it with √(c m) of that: √(c / k), of 3 kN/m and of twice
+/// 77 kN/m, as foam stiffens under such a hit.
+const THROW: f64 = 7.2;
 
 impl Row {
     /// Returns what may come of the smallest severity in a phase.
     pub(super) fn expected(&self, phase: Phase) -> Vec<Fate> {
         match phase {
             Phase::Approach => self.approach.clone(),
-            Phase::FirstTouch | Phase::Steady | Phase::Sliding | Phase::AtALimit => self.contact.clone(),
+            Phase::FirstTouch | Phase::Steady | Phase::Sliding => self.contact.clone(),
+            // A limit can act before the touch and after it.
+            Phase::AtALimit => {
+                let more = self.approach.iter().filter(|fate| !self.contact.contains(fate));
+                self.contact.iter().chain(more).copied().collect()
+            }
             Phase::Ramping => vec![Fate::Halts, Fate::Fails],
         }
     }
@@ -132,7 +141,7 @@ impl Row {
         let allowed = match self.allowance {
             None => ceiling,
             Some(Allowance::OverGain) => ceiling / severity,
-            Some(Allowance::Force) => ceiling + severity,
+            Some(Allowance::Throw) => ceiling + severity * THROW,
             Some(Allowance::Hit) => ceiling + severity * HIT_N_S_PER_M,
         };
         allowed + TOUCH_N
@@ -185,7 +194,7 @@ impl Row {
         let force = match self.allowance {
             None => "ceiling + 6 N",
             Some(Allowance::OverGain) => "ceiling / gain + 6 N",
-            Some(Allowance::Force) => "ceiling + 6 N + the push",
+            Some(Allowance::Throw) => "ceiling + 6 N + 7.2 times the push",
             Some(Allowance::Hit) => "ceiling + 6 N + 480 N s/m of the speed",
         };
         [self.name.clone(), grown, fates(&self.approach), fates(&self.contact), force.to_owned(), self.why.clone()]
