@@ -21,7 +21,7 @@ fn the_tick_neither_allocates_nor_frees_in_any_shipped_graph() {
     for (graph, request) in graphs() {
         let mut engine = engine(&request);
         let mut ticks = 0;
-        while let Some(now) = engine.next().filter(|_| ticks < 3000) {
+        while let Some(now) = engine.next().filter(|_| ticks < 1800) {
             engine.exchange(now).unwrap();
             // From latch to commit: contact comes, flickers and goes in every graph, and states are reset.
             let counted = allocation_counter::measure(|| engine.step().unwrap());
