@@ -242,8 +242,8 @@ fn types() -> Vec<(String, Vec<String>)> {
     types
 }
 
-/// Nodes that write no numbers cannot write a wrong one.
-const WITHOUT_NUMBERS: [&str; 2] = ["binarize", "label"];
+/// Nodes that write no numbers cannot write a wrong one, nor can one that begins at the end of the task.
+const WITHOUT_NUMBERS: [&str; 3] = ["binarize", "label", "park"];
 
 #[test]
 fn a_nan_at_each_node_in_turn_ends_the_run_and_names_it() {

@@ -21,6 +21,9 @@ pub struct Tick {
     pub is_halted: bool,
     /// Whether the operator sent `resume` before this tick.
     pub is_resumed: bool,
+    /// Whether the device did not get the command of this node in the last tick, although it is wired to it: the command
+    /// was absent, or a task that drives the device rests, so the runtime ramped to zero, or back to the command.
+    pub is_overruled: bool,
 }
 
 impl Tick {
@@ -36,6 +39,7 @@ impl Tick {
             reset_after: 20_000_000,
             is_halted: false,
             is_resumed: false,
+            is_overruled: false,
         }
     }
 }

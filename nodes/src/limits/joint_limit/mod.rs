@@ -38,7 +38,8 @@ pub use limiter::Limiter;
 ///
 /// **A joint that does not follow** ends the task with a fault, because its motion is no longer the one that the limiters
 /// before it have let pass. The equilibrium must move as the commands say: a joint that was told more than 4 mrad and has
-/// made less than a quarter of it for 300 ms is stuck. The commands must act within 100 ms.
+/// made less than a quarter of it for 300 ms is stuck. The commands must act within 100 ms. A command that the arm does
+/// not get, as at a halt, does not count.
 ///
 /// Each scalar beside the velocity is 1 while the limit of that name does not act.
 ///
@@ -168,7 +169,7 @@ impl Node for JointLimit {
         let wanted = inputs.velocity.filter(|velocity| is_arm_fresh && is_fresh(velocity.stamp(), self.max_age));
         let wanted = wanted.map(|velocity| &*velocity.value().0);
         let (position, equilibrium) = (&inputs.position.0, &inputs.equilibrium.0);
-        if is_arm_fresh {
+        if is_arm_fresh && !tick.is_overruled {
             out.stuck.set(following.note(tick, limiter.velocities(), equilibrium));
         } else {
             following.pause();

@@ -29,7 +29,7 @@ pub enum Phase {
 pub struct Times {
     /// How long a contact is missing before it is lost.
     pub debounce: i64,
-    /// How long the arm waits before it searches, from the first frame without the contact.
+    /// How long the arm waits before it searches, from the first frame without the contact or a later one with a touch.
     pub wait: i64,
 }
 
@@ -42,6 +42,8 @@ pub struct Course {
     touched_since: Option<i64>,
     /// When that contact was first missing, if it has not come back.
     missing_since: Option<i64>,
+    /// Since when nothing has touched the pad, not even for a frame, if that contact is missing.
+    untouched_since: Option<i64>,
 }
 
 impl Course {
@@ -54,23 +56,28 @@ impl Course {
         if lasts && (self.touched_since.is_none() || self.missing_since.is_some()) {
             let is_same = self.missing_since.zip(self.set_since).is_some_and(|(end, set)| set - end <= SAME_CONTACT_NS);
             let touched_since = self.touched_since.filter(|_| is_same).or(Some(now));
-            *self = Self { touched_since, missing_since: None, ..*self };
+            *self = Self { touched_since, missing_since: None, untouched_since: None, ..*self };
         } else if flickers {
-            self.missing_since = None;
+            (self.missing_since, self.untouched_since) = (None, None);
         }
         let Some(touched) = self.touched_since else { return Phase::Free };
         if !touches {
             self.missing_since.get_or_insert(now);
+            self.untouched_since.get_or_insert(now);
         }
         let Some(missing) = self.missing_since else { return Phase::Touched };
+        if touches {
+            self.untouched_since = Some(now);
+        }
         let (gap, is_bounce) = (now - missing, missing - touched < FIRST_TOUCH_NS);
+        let rested = now - self.untouched_since.unwrap_or(missing);
         if !touches && gap < times.debounce {
             Phase::Barred
         } else if touches || is_bounce {
             Phase::Search
         } else if is_leaning {
             Phase::Retreat
-        } else if gap < times.wait {
+        } else if rested < times.wait {
             Phase::Rest
         } else {
             Phase::Search

@@ -130,6 +130,17 @@ fn a_flicker_is_no_loss_and_a_bounce_is_searched_at_once() {
 }
 
 #[test]
+fn a_touch_for_a_moment_begins_the_rest_anew() {
+    let mut cell = Cell::new();
+    cell.run(2000.0, true, 0.0);
+    cell.run(400.0, false, 0.0);
+    cell.run(20.0, true, 0.0);
+    let after = cell.run(596.0, false, 0.0);
+    assert!(after.iter().all(|twist| !is_into_the_object(twist)), "{after:?}");
+    assert!(cell.run(8.0, false, 0.0).last().is_some_and(is_into_the_object), "then it searches");
+}
+
+#[test]
 fn a_contact_that_comes_back_soon_is_no_first_touch() {
     let mut cell = Cell::new();
     cell.run(2000.0, true, 0.003);

@@ -25,8 +25,8 @@ pub(super) fn describe(test: &RestTest, unit: &str, rest: &Rest) -> String {
                 .to_owned()
         }
         Verdict::Sunk => format!(
-            "the readings of the whole pad have sunk below their zeros, by more than {bound} {unit} in the mean: forces \
-             read too small; lift the pad off, and start again for new zeros"
+            "more than a quarter of the readings have sunk below their zeros, by more than {bound} {unit}, so forces read \
+             too small; lift the pad off, and start again for new zeros"
         ),
         Verdict::TooManyBad => {
             let count = rest.bad_count;

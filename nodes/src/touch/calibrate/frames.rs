@@ -1,4 +1,4 @@
-//! Frames that are no measurement: garbage, an image that the sensor repeats, and readings below their zeros.
+//! Frames that are no measurement: garbage, and an image that the sensor repeats.
 //!
 //! The sum and the peak of the whole image stand for it, as `tactile_source` has computed them already: no pass over the
 //! tactels is needed. With noise, two images with the same sum and the same peak are the same image, except by a chance
@@ -14,8 +14,6 @@ use super::{Inputs, InputsShapes, Params};
 const BLIND: u32 = 3;
 /// Number of frames in a row with one image from which on it is stuck: the task ends.
 const STUCK: u32 = 25;
-/// Number of frames in a row with the whole pad below its zeros from which on the task ends.
-const SUNK: u32 = 10;
 
 /// Which frames are dropped.
 #[derive(Debug, Clone, Copy)]
@@ -35,20 +33,18 @@ pub(super) struct Frames {
     repeats: u32,
     /// Whether the frame before was dropped because of its sum.
     was_odd: bool,
-    /// Number of frames in a row whose mean reading was below the zeros by more than the bound.
-    sunk: u32,
     /// Number of frames that were dropped.
     pub(super) dropped: u64,
 }
 
 /// What a frame is.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Frame {
     Good,
     /// No measurement, or the same image again too often: nothing is known.
     Blind,
-    /// It shows that the pad cannot be used any more.
-    Last(Verdict),
+    /// The same image for so long that the sensor is stuck.
+    Stuck,
 }
 
 impl Frames {
@@ -88,12 +84,9 @@ impl FrameRules {
         }
         frames.repeats = if frames.last == Some(now) { frames.repeats + 1 } else { 1 };
         (frames.last, frames.was_odd) = (Some(now), false);
-        frames.sunk = if now[0] < rest.floor { frames.sunk + 1 } else { 0 };
-        let has_passed = rest.verdict == Verdict::Passed;
-        match (frames.repeats, frames.sunk) {
-            (STUCK.., _) if rest.has_noise && has_passed => Frame::Last(Verdict::Stuck),
-            (BLIND.., _) if rest.has_noise => Frame::Blind,
-            (_, SUNK..) if has_passed => Frame::Last(Verdict::Sunk),
+        match frames.repeats {
+            STUCK.. if rest.has_noise && rest.verdict == Verdict::Passed => Frame::Stuck,
+            BLIND.. if rest.has_noise => Frame::Blind,
             _ => Frame::Good,
         }
     }
@@ -172,25 +165,6 @@ mod tests {
         assert_eq!(rig.get::<bool>("failed"), Some(&true));
         assert!(rig.found().unwrap().contains("repeats its image bit for bit"), "{:?}", rig.found());
         assert!(!show(&mut rig, REST[1]), "it stays out of use");
-    }
-
-    #[test]
-    fn a_pad_whose_zero_sinks_ends_the_task_and_one_that_is_pressed_or_rises_does_not() {
-        let show_all = |rig: &mut NodeRig, shift: f32, frames: usize| {
-            (0..frames).fold(true, |all, i| show(rig, REST[i % 2].map(|cell| cell + shift)) && all)
-        };
-        let params = "rest_frames = 8\ntare_bound = 50.0";
-        let mut rig = make(params, true).unwrap();
-        show_all(&mut rig, 0.0, 8);
-        assert!(show_all(&mut rig, -48.0, 50) && show_all(&mut rig, 300.0, 50), "within the bound, and in contact");
-        assert!(show_all(&mut rig, -52.0, 9), "not for long");
-        assert!(show_all(&mut rig, 0.0, 1) && show_all(&mut rig, -52.0, 9), "again not for long");
-        assert!(!show_all(&mut rig, -52.0, 1));
-        assert_eq!(rig.get::<bool>("failed"), Some(&true));
-        assert!(rig.found().unwrap().contains("sunk below their zeros"), "{:?}", rig.found());
-        let mut unbounded = make("rest_frames = 8", true).unwrap();
-        show_all(&mut unbounded, 0.0, 8);
-        assert!(show_all(&mut unbounded, -90.0, 50), "no bound is given");
     }
 
     #[test]

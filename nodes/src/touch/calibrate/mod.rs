@@ -7,6 +7,7 @@ mod findings;
 mod frames;
 mod repair;
 mod rest;
+mod sinking;
 mod tactel_curves;
 mod tare;
 
@@ -21,6 +22,7 @@ use curves::{CurveParams, PerTactel};
 use frames::{Frame, FrameRules, Frames};
 use repair::repair;
 use rest::{Rest, RestTest, Verdict};
+use sinking::Sinking;
 use tactel_curves::TactelCurves;
 use tare::{Averages, Rules};
 
@@ -46,7 +48,7 @@ use tare::{Averages, Rules};
 /// counts, so that an impact costs one frame. A pad whose self-test saw noise never sends one image three times in a
 /// row: then the images are absent, and after 25 such frames the task ends with a fault. A pad that repeats its readings
 /// at rest may repeat them. A pad whose zero sinks hides a force: with a self-test and a `tare_bound`, the task ends with
-/// a fault if the mean of all readings is below that of the zeros by more than the bound, in 10 frames in a row.
+/// a fault if more than a quarter of the readings are below their zeros by more than the bound, for 24 frames.
 ///
 /// **Tare.** The zero of foam drifts. When `in.tare` becomes set, the mean of the next `tare_window` frames becomes the
 /// zero of each tactel; with `tare_at_start` the mean of the first frames does. A pad is only tared while nothing
@@ -197,6 +199,8 @@ pub struct State {
     rest: Rest,
     /// What was seen of the frames.
     frames: Frames,
+    /// What was seen of a zero that sinks.
+    sinking: Sinking,
     absence: Absence,
 }
 
@@ -238,7 +242,14 @@ impl Node for Calibrate {
     fn state(&self) -> State {
         let averages = self.rules.as_ref().map_or_else(Averages::default, |rules| rules.averages(self.offset.len()));
         let rest = self.test.as_ref().map_or_else(|| Rest::passed(&self.offset), |test| test.begin(&self.offset));
-        State { offset: self.offset.clone(), averages, rest, frames: Frames::default(), absence: Absence::default() }
+        State {
+            offset: self.offset.clone(),
+            averages,
+            rest,
+            frames: Frames::default(),
+            sinking: Sinking::default(),
+            absence: Absence::default(),
+        }
     }
 
     fn found(&self, state: &State) -> Option<String> {
@@ -268,7 +279,10 @@ impl Node for Calibrate {
             Some(rules) if image.is_new() => rules.judge(&inputs, &state.rest, &mut state.frames),
             _ => Frame::Good,
         };
-        if let Frame::Last(verdict) = frame {
+        let bound = self.test.as_ref().and_then(|test| test.bound).filter(|_| image.is_new());
+        let has_sunk = bound.is_some_and(|bound| state.sinking.look(image.cells(), &state.rest.zeros, bound));
+        let late = if frame == Frame::Stuck { Some(Verdict::Stuck) } else { has_sunk.then_some(Verdict::Sunk) };
+        if let Some(verdict) = late.filter(|_| state.rest.verdict == Verdict::Passed) {
             state.rest.verdict = verdict;
             out.failed.set(true);
         }

@@ -35,7 +35,7 @@ pub(super) enum Verdict {
     Unfit { count: usize, worst: (usize, f64) },
     /// The pad has passed, and later repeats its image.
     Stuck,
-    /// The pad has passed, and later its mean reading is below the zeros by more than the bound.
+    /// The pad has passed, and later many readings are below their zeros by more than the bound.
     Sunk,
     /// Something touches the pad: so many tactels are above the bound, and one is the farthest.
     Touched { count: usize, worst: (usize, f64) },
@@ -67,8 +67,6 @@ pub(super) struct Rest {
     pub(super) noise: f64,
     /// Largest difference between a zero and the calibrated one [unit of the input].
     pub(super) shift: f64,
-    /// The smallest sum of the readings that a sound pad can have; minus infinity until the test has passed.
-    pub(super) floor: f64,
     /// Whether sound tactels change in most frames.
     pub(super) has_noise: bool,
     /// Number of frames so far.
@@ -135,7 +133,7 @@ struct Reading {
 impl Rest {
     /// Returns the state without a test.
     pub(super) fn passed(zeros: &[f32]) -> Self {
-        Self { verdict: Verdict::Passed, zeros: zeros.to_vec(), floor: f64::NEG_INFINITY, ..Self::default() }
+        Self { verdict: Verdict::Passed, zeros: zeros.to_vec(), ..Self::default() }
     }
 }
 
@@ -165,7 +163,6 @@ impl RestTest {
             bad: Vec::with_capacity(self.max_bad + 1),
             tactels: vec![Tactel::default(); zeros.len()],
             sorted: Vec::with_capacity(zeros.len()),
-            floor: f64::NEG_INFINITY,
             ..Rest::default()
         }
     }
@@ -175,7 +172,7 @@ impl RestTest {
         rest.verdict = Verdict::Testing;
         rest.zeros.copy_from_slice(zeros);
         rest.bad.clear();
-        (rest.bad_count, rest.noise, rest.shift, rest.floor) = (0, 0.0, 0.0, f64::NEG_INFINITY);
+        (rest.bad_count, rest.noise, rest.shift) = (0, 0.0, 0.0);
         (rest.has_noise, rest.is_second, rest.frames) = (false, false, 0);
         rest.tactels.fill(Tactel::default());
     }
@@ -196,7 +193,6 @@ impl RestTest {
         rest.verdict = self.judge(is_dead, rest);
         if rest.verdict == Verdict::Passed {
             self.tare(rest);
-            rest.floor = self.floor(&rest.zeros);
         } else if !rest.is_second {
             (rest.verdict, rest.is_second, rest.frames) = (Verdict::Testing, true, 0);
             rest.tactels.fill(Tactel::default());
@@ -279,12 +275,6 @@ impl RestTest {
                 rest.zeros[i] = (f64::from(rest.zeros[i]) + shift) as f32;
             }
         }
-    }
-
-    /// Returns the sum of the readings of a pad whose tactels are all below these zeros by the bound: nothing that presses
-    /// on a pad lowers a reading.
-    fn floor(&self, zeros: &[f32]) -> f64 {
-        self.bound.map_or(f64::NEG_INFINITY, |bound| zeros.iter().map(|zero| f64::from(*zero) - bound).sum())
     }
 
     /// Returns the live tactels at the four sides of tactel `i`.

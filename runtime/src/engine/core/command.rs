@@ -15,14 +15,16 @@ pub(crate) struct CommandSlot {
     /// The tasks that drive it. It rests while one of them does.
     pub(crate) tasks: Box<[usize]>,
     pub(crate) device: usize,
-    source: PortId,
+    pub(crate) source: PortId,
     pub(crate) command: usize,
     /// Maximum age of the graph's command [ns].
     max_age: i64,
     /// Maximum acceleration of each joint [rad/s²]; infinite if it has no limit.
     pub(crate) accelerations: Box<[f64]>,
     /// Whether it has reached the graph's command.
-    follows: bool,
+    pub(crate) follows: bool,
+    /// The runner of the node that makes the graph's command.
+    pub(crate) maker: Option<usize>,
 }
 
 impl CommandSlot {
@@ -36,6 +38,7 @@ impl CommandSlot {
             max_age: age.max_age,
             accelerations: accelerations.into(),
             follows: false,
+            maker: None,
         }
     }
 

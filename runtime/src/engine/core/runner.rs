@@ -60,6 +60,8 @@ pub(crate) struct NodeRunner {
     is_every_tick: bool,
     /// Whether the configuration has changed since the last step.
     is_switched: bool,
+    /// See [`Tick::is_overruled`].
+    pub(crate) is_overruled: bool,
     state: RunState,
 }
 
@@ -100,6 +102,7 @@ impl NodeRunner {
             aged: Box::default(),
             is_every_tick,
             is_switched: false,
+            is_overruled: false,
             state: RunState::Ready,
         }
     }
@@ -149,7 +152,7 @@ impl NodeRunner {
                 return;
             }
             if is_woken {
-                tick.stamp = stamp;
+                (tick.stamp, tick.is_overruled) = (stamp, self.is_overruled);
                 self.node.step(tick, bus, &self.wires, &self.outputs);
             }
         }
@@ -170,6 +173,11 @@ impl NodeRunner {
         }
         self.state = RunState::Ready;
         true
+    }
+
+    /// Whether the node writes this port.
+    pub(crate) fn writes(&self, port: PortId) -> bool {
+        self.outputs.iter().any(|output| output.mark == port.mark)
     }
 
     /// Returns what the node has found out so far.

@@ -52,9 +52,12 @@ impl Core {
         bus: Bus,
         (runners, owners): (Vec<NodeRunner>, Vec<usize>),
         inlets: Vec<Inlet>,
-        (commands, reports): (Vec<CommandSlot>, Vec<ReportSlot>),
+        (mut commands, reports): (Vec<CommandSlot>, Vec<ReportSlot>),
         tasks: Vec<TaskTick>,
     ) -> Self {
+        for command in &mut commands {
+            command.maker = runners.iter().position(|runner| runner.writes(command.source));
+        }
         let tick = Tick { index: 0, ..Tick::first() };
         Self { bus, inlets, tick, runners, owners, tasks, commands, reports, current: 0 }
     }
@@ -143,6 +146,9 @@ impl Core {
         for command in &mut self.commands {
             let is_halted = command.tasks.iter().any(|task| self.tasks[*task].is_halted);
             command.commit(&self.bus, &mut devices[command.device].commands, &self.tick, is_halted);
+            if let Some(maker) = command.maker {
+                self.runners[maker].is_overruled = !command.follows;
+            }
         }
         for report in &self.reports {
             report.commit(&self.bus, &mut devices[report.device].commands, &self.tick);
