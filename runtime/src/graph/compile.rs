@@ -91,6 +91,8 @@ pub(crate) fn compile_in(mut loader: Loader, catalogue: &Catalogue, request: &Re
     };
     let outline = outline.build();
     check::unused::check(&net, &modes, view.sources(), &mut warnings);
+    let facts = opened.facts(&net);
+    warnings.extend(catalogue.lints().iter().flat_map(|lint| lint(&outline, &facts)));
     let mut warnings = sorted(check::parts::move_out(&flat, &sources, warnings));
     let allowed = check::allow::silence(&flat, &mut warnings);
     let view = view.plan(&net, &nodes, &ports);
@@ -98,8 +100,7 @@ pub(crate) fn compile_in(mut loader: Loader, catalogue: &Catalogue, request: &Re
     let reach = find_reach(&net, &nodes, &modes);
     let tasks = plan_tasks(&net, &ports, modes, (&starts, &shown), &gaps);
     let period = ((period * 1e9).round() as i64).max(1);
-    let (exports, facts, silences) =
-        (net.exports_by_name(), opened.facts(&net), check::silence::describe(&net, &opened));
+    let (exports, silences) = (net.exports_by_name(), check::silence::describe(&net, &opened));
     let to_commission = bench::to_commission(&net, &opened, &sources);
     let plan = Plan { roles, devices: opened.devices, nodes, commands, clock, period, tasks, reach, allowed };
     Ok(Compiled { plan, view, sources, warnings, outline, exports, facts, silences, to_commission })
