@@ -81,7 +81,7 @@ fn edge() -> Catalogue {
 
 /// Everything there is: one line each.
 pub fn catalogue() -> Catalogue {
-    edge()
+    let catalogue = edge()
         .group("touch: from a tactile image to features of the contact")
         .node::<touch::tactile_source::TactileSource>()
         .node::<touch::calibrate::Calibrate>()
@@ -148,5 +148,8 @@ pub fn catalogue() -> Catalogue {
         .node::<flow::delay::Delay<Twist>>()
         .node::<flow::signal_generator::SignalGenerator>()
         .node::<flow::multisine::Multisine>()
-        .node::<flow::probe::Probe>()
+        .node::<flow::probe::Probe>();
+    #[cfg(feature = "cli")]
+    let catalogue = catalogue.lint(tool::lint);
+    catalogue
 }

@@ -1,4 +1,4 @@
-//! The outline of a graph, as data: parts are expanded, and every value has its origin in a file, a default or a fact.
+//! the outline of a graph, as data: parts are expanded, and every value has its origin in a file, a default or a fact.
 //!
 //! `show` prints it, and the lints of a catalogue read it.
 
