@@ -239,7 +239,7 @@ fn good() -> Vec<Variant> {
         variant("edge", &["setpoint = { pressure = 0.1, orientation = -0.7 }"]),
         variant("force", &["setpoint = { pressure = 1.0 }"]),
         // Other signs and scales of the same motion.
-        variant("hybrid", &["columns.x = [-2, 0, 0, 0, 0, 0]"]),
+        variant("hybrid", &["gains.x = { kp = 1.75 }", "columns.x = [-2, 0, 0, 0, 0, 0]"]),
         variant("hybrid", &["columns.x = [-1, 0, 0, 0, 20, 0]"]),
         variant("rolling", &["columns.x = [-1, 0, 0, 0, -5, 0]", "columns.y = [0, -1, 0, 5, 0, 0]"]),
         // Features left out, with their columns.
@@ -296,8 +296,10 @@ fn no_shipped_task_is_blamed_on_any_bench_that_it_runs_on() {
     let folder = workspace().join("graphs");
     let benches: Vec<Option<PathBuf>> =
         [None].into_iter().chain(toml_files(&folder.join("benches")).into_iter().map(Some)).collect();
+    // A bench that waits for a simulator to connect is left out.
+    let waits = |bench: &Option<PathBuf>| bench.as_ref().is_some_and(|bench| bench.ends_with("lockstep.toml"));
     for task in toml_files(&folder) {
-        for bench in &benches {
+        for bench in benches.iter().filter(|bench| !waits(bench)) {
             let request = Request { bench: bench.clone(), ..Request::file(&task) };
             let Ok(compiled) = compile(&catalogue(), &request) else { continue };
             pairs += 1;

@@ -3,10 +3,10 @@
 use std::f64::consts::{FRAC_PI_2, PI};
 
 use tactflow_runtime::graph::OutlinedBlock;
-use tactflow_runtime::source::{Code, Diagnostic, Diagnostics, Item};
+use tactflow_runtime::source::{Code, Diagnostic, Diagnostics, Edit, Item};
 
 use super::rows::{Answer, Row};
-use super::{Controlled, ModeLaw, with_edit};
+use super::{Controlled, ModeLaw};
 use crate::tool::control::law::{COMPONENTS, Feature};
 use crate::tool::control::settings::{Nodes, source};
 
@@ -81,7 +81,8 @@ fn foreign(mode: &ModeLaw<'_>, feature: &Feature, quantity: &str, column: [f64; 
                 other.name,
                 array(&column)
             );
-            with_edit(diagnostic, place.clone(), true, array(&column)).help(help).note(place, "the other column")
+            let edit = Edit::Replace(place.clone(), array(&column));
+            diagnostic.edit(edit).help(help).note(place, "the other column")
         });
     }
     let right: Vec<String> = row.known.iter().map(|answer| format!("`{}`", COMPONENTS[answer.component])).collect();
@@ -94,7 +95,7 @@ fn foreign(mode: &ModeLaw<'_>, feature: &Feature, quantity: &str, column: [f64; 
 fn replaced(mode: &ModeLaw<'_>, feature: &Feature, message: String, right: [f64; 6]) -> Diagnostic {
     let (place, right) = (mode.place_of_column(feature), array(&right));
     let help = format!("write `columns.{} = {right}`", feature.name);
-    with_edit(Diagnostic::new(Code::WrongColumn, place.clone(), message).help(help), place, true, right)
+    Diagnostic::new(Code::WrongColumn, place.clone(), message).help(help).edit(Edit::Replace(place, right))
 }
 
 /// Writes a column as TOML.
@@ -141,7 +142,10 @@ fn idle(arm: &Controlled<'_>, mode: &ModeLaw<'_>) -> Diagnostics {
         let message = format!("`{}` selects `{name}`, but no column of `{}` moves it", projector.name, jacobian.name);
         let help = format!("write 0 for `{name}`, or add an entry to the column of the feature that it should control");
         let diagnostic = Diagnostic::new(Code::IdleAxis, place.clone(), message).help(help);
-        Some(with_edit(diagnostic, place, entries.is_some(), "0".into()))
+        Some(match entries {
+            Some(_) => diagnostic.edit(Edit::Replace(place, "0".into())),
+            None => diagnostic,
+        })
     });
     found.collect()
 }

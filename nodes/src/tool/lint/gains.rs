@@ -56,9 +56,10 @@ fn windup(arm: &Controlled<'_>, mode: &ModeLaw<'_>, feature: &Feature) -> Option
         "the integral of `{name}` grows at every error until it alone moves the sensor at full speed: it winds up while \
          the object is far, and overshoots"
     );
+    let full = (full * 1e3).round() / 1e3;
     let help = format!(
-        "add `within` to the gains of `{name}`, about five times its noise, or a `limit` below {full:.2}, where the \
-         motion reaches its limit"
+        "write `within` in the gains of `{name}`, about five times its noise, or a `limit` below {full}, where the motion \
+         reaches its limit"
     );
     Some(Diagnostic::new(Code::Windup, mode.place_of_gain(feature, "ki"), message).help(help))
 }

@@ -15,7 +15,7 @@ use std::collections::BTreeSet;
 use std::ops::Range;
 
 use tactflow_runtime::graph::{NO_SPAN, Outline, OutlinedMode};
-use tactflow_runtime::source::{Code, Diagnostic, Diagnostics, Edit};
+use tactflow_runtime::source::{Code, Diagnostics};
 
 use super::control::chain::{Limiter, chain};
 use super::control::contacts::{Contact, contacts};
@@ -48,17 +48,30 @@ pub(crate) fn lint(outline: &Outline, facts: &[(String, toml::Value)]) -> Diagno
     let mut found = Diagnostics::new();
     for (command, port) in commands(outline) {
         let Some(arm) = controlled(outline, &index, facts, (&command, port)) else { continue };
+        let before = found.len();
         modes::check(&arm, &mut found);
-        // A task that rolls without its force has a column of the force that nothing selects.
-        let rolls = found.iter().any(|one| one.code == Code::UnforcedRolling);
         columns::check(&arm, &mut found);
-        found.retain(|one| !(rolls && one.code == Code::UnusedColumn));
         gains::check(&arm, &mut found);
         stability::check(&arm, &mut found);
+        let of_arm = found.split_off(before);
+        found.extend(without_consequences(of_arm));
     }
     // Several modes, and several parts of the same file, read the same number.
     let mut seen = BTreeSet::new();
     found.retain(|one| seen.insert((one.code, one.span.start)));
+    found
+}
+
+/// Removes what another warning about the same arm causes: a task that rolls without its force has a column that nothing
+/// selects, and a column with an entry in the wrong place leaves a component without one.
+fn without_consequences(mut found: Diagnostics) -> Diagnostics {
+    let has = |code: Code| found.iter().any(|one| one.code == code);
+    let (has_wrong, rolls) = (has(Code::WrongColumn), has(Code::UnforcedRolling));
+    found.retain(|one| match one.code {
+        Code::IdleAxis => !has_wrong,
+        Code::UnusedColumn => !has_wrong && !rolls,
+        _ => true,
+    });
     found
 }
 
@@ -122,9 +135,4 @@ impl ModeLaw<'_> {
         let is_right = |feature: &&Feature| [feature.kp, feature.ki, feature.kd].iter().all(|gain| *gain >= 0.0);
         self.law.features.iter().filter(|feature| feature.moves()).filter(is_right)
     }
-}
-
-/// Adds the edits of a fix, if the places are those of values: a node has no value to replace.
-fn with_edit(diagnostic: Diagnostic, place: Range<usize>, is_value: bool, text: String) -> Diagnostic {
-    if is_value { diagnostic.edit(Edit::Replace(place, text)) } else { diagnostic }
 }

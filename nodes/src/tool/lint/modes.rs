@@ -29,7 +29,8 @@ fn rolling(mode: &ModeLaw<'_>) -> Option<Diagnostic> {
     let rolling = mode.moving().find(rolls)?;
     let presses = |feature: &Feature| {
         let is_place = matches!(mode.quantity(feature), Some("x" | "y" | "orientation"));
-        feature.has_gain() && feature.column[2] != 0.0 && !is_place
+        // `pid` warns of a force without a gain.
+        feature.column[2] != 0.0 && !is_place
     };
     let mut guides = mode.law.guidance.iter();
     if mode.law.features.iter().any(presses) || guides.any(|it| it.passes[2] && !GUIDES.contains(&&*it.kind)) {

@@ -2,10 +2,9 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use tactflow_runtime::graph::NO_SPAN;
 use tactflow_runtime::source::{Code, Diagnostic, Diagnostics, Edit};
 
-use super::{Controlled, ModeLaw, with_edit};
+use super::{Controlled, ModeLaw};
 use crate::tool::control::choose::{Wanted, factor};
 use crate::tool::control::contacts::Contact;
 use crate::tool::control::law::{Feature, Filter};
@@ -169,9 +168,10 @@ fn slow_filter(mode: &ModeLaw<'_>, feature: &Feature, contacts: &[Contact], slow
     Some(match faster {
         Some((key @ ("time_constant_ms" | "window_ms"), value)) => {
             let value = rounded_down(value);
-            let is_value = place != node.span && place != NO_SPAN;
             let help = format!("write `{key} = {value}` or less, or smaller gains of `{name}`");
-            with_edit(diagnostic.help(help), place, is_value, format!("{value}"))
+            let diagnostic = diagnostic.help(help);
+            // A default is written nowhere, so it has no text to replace.
+            if place == node.span { diagnostic } else { diagnostic.edit(Edit::Replace(place, format!("{value}"))) }
         }
         _ => diagnostic.help("use a faster filter, or smaller gains"),
     })
