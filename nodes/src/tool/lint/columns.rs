@@ -153,12 +153,13 @@ fn idle(arm: &Controlled<'_>, mode: &ModeLaw<'_>) -> Diagnostics {
 /// Returns the warnings about columns that no mode uses, although their features have gains.
 fn unused(arm: &Controlled<'_>) -> Diagnostics {
     let Some(first) = arm.modes.first() else { return Diagnostics::new() };
-    let controls = |name: &str, jacobian: &str| {
+    // Several nodes can turn the same control into motion.
+    let controls = |wanted: &Feature| {
         let mut features = arm.modes.iter().flat_map(|mode| &mode.law.features);
-        features.any(|feature| feature.name == name && feature.jacobian == jacobian && feature.moves())
+        features.any(|feature| feature.name == wanted.name && feature.pid == wanted.pid && feature.moves())
     };
     let features = first.law.features.iter().filter(|feature| feature.has_gain());
-    let dead = features.filter(|feature| !controls(&feature.name, &feature.jacobian) && !is_along_line(arm, feature));
+    let dead = features.filter(|feature| !controls(feature) && !is_along_line(arm, feature));
     let found = dead.filter_map(|feature| {
         let column = first.column(feature)?;
         let moved: Vec<String> = (0..6).filter(|i| column[*i] != 0.0).map(|i| format!("`{}`", COMPONENTS[i])).collect();

@@ -38,16 +38,23 @@ struct Controlled<'a> {
 /// What moves an arm in one mode.
 struct ModeLaw<'a> {
     mode: Option<&'a OutlinedMode>,
+    /// The frames of the sensors that arms move.
+    carried: &'a BTreeSet<&'a str>,
     nodes: Nodes<'a>,
     law: Law,
 }
 
 /// Returns the warnings about the control law of a graph.
 pub(crate) fn lint(outline: &Outline, facts: &[(String, toml::Value)]) -> Diagnostics {
+    let commands: Vec<(String, &str)> = commands(outline).collect();
+    if commands.is_empty() {
+        return Diagnostics::new();
+    }
     let index = Index::new(outline);
+    let carried = carried(outline);
     let mut found = Diagnostics::new();
-    for (command, port) in commands(outline) {
-        let Some(arm) = controlled(outline, &index, facts, (&command, port)) else { continue };
+    for (command, port) in &commands {
+        let Some(arm) = controlled((outline, &index, &carried), facts, (command, port)) else { continue };
         let before = found.len();
         modes::check(&arm, &mut found);
         columns::check(&arm, &mut found);
@@ -75,10 +82,17 @@ fn without_consequences(mut found: Diagnostics) -> Diagnostics {
     found
 }
 
+/// Returns the frames of the sensors whose pose follows from the joints of an arm. What the others measure moves with the
+/// object, and not against the sensor.
+fn carried(outline: &Outline) -> BTreeSet<&str> {
+    let states = outline.nodes.iter().filter(|node| node.kind.text == "arm_state");
+    let poses = states.flat_map(|node| &node.outputs).filter(|port| port.name.ends_with(".sensor_pose"));
+    poses.filter_map(|port| port.frames.first()?.as_deref()).collect()
+}
+
 /// Returns what moves an arm; `None` if a chain of limiters leads to no node.
 fn controlled<'a>(
-    outline: &'a Outline,
-    index: &'a Index<'a>,
+    (outline, index, carried): (&'a Outline, &'a Index<'a>, &'a BTreeSet<&'a str>),
     facts: &[(String, toml::Value)],
     (command, port): (&str, &str),
 ) -> Option<Controlled<'a>> {
@@ -86,7 +100,7 @@ fn controlled<'a>(
     let task = index.task_of(port);
     let modes = index.modes(task).into_iter().map(|mode| {
         let nodes = Nodes::new(index, mode);
-        ModeLaw { mode, nodes, law: law(&nodes, &twist) }
+        ModeLaw { mode, carried, nodes, law: law(&nodes, &twist) }
     });
     let modes = modes.collect();
     // `explain` says what is wrong with contacts that cannot be read.
@@ -95,11 +109,15 @@ fn controlled<'a>(
 }
 
 impl ModeLaw<'_> {
-    /// Returns what a feature measures, such as `x`, if one of the nodes does whose geometry is known.
+    /// Returns what a feature measures, such as `x`, if it comes from a sensor on an arm, by a node whose geometry is
+    /// known.
     fn quantity<'f>(&self, feature: &'f Feature) -> Option<&'f str> {
         let port = feature.measured.as_deref()?;
-        let kind = &*self.nodes.writer(port)?.kind.text;
-        ["moments", "principal_axes", "hough"].contains(&kind).then(|| port.rsplit('.').next())?
+        let node = self.nodes.writer(port)?;
+        let frame = node.outputs.iter().find(|output| output.name == port)?.frames.first()?.as_deref()?;
+        let is_known =
+            ["moments", "principal_axes", "hough"].contains(&&*node.kind.text) && self.carried.contains(frame);
+        is_known.then(|| port.rsplit('.').next())?
     }
 
     /// Returns the column of a feature before all projectors.
