@@ -52,7 +52,7 @@ use tactflow_runtime::signal::{Scalar, Twist};
 #[cfg(feature = "cli")]
 pub use tool::tool;
 
-/// The built-in files, the roles and the devices: one line each.
+/// The built-in files, the roles, the devices and the checks of whole graphs: one line each.
 fn edge() -> Catalogue {
     let catalogue = Catalogue::new()
         .files(builtin::FILES)
@@ -76,12 +76,14 @@ fn edge() -> Catalogue {
         .device::<devices::agni::Agni>()
         .device::<devices::lwr_fri::LwrFri>()
         .device::<devices::ur::Ur>();
+    #[cfg(feature = "cli")]
+    let catalogue = catalogue.lint(tool::lint);
     catalogue
 }
 
 /// Everything there is: one line each.
 pub fn catalogue() -> Catalogue {
-    let catalogue = edge()
+    edge()
         .group("touch: from a tactile image to features of the contact")
         .node::<touch::tactile_source::TactileSource>()
         .node::<touch::calibrate::Calibrate>()
@@ -148,8 +150,5 @@ pub fn catalogue() -> Catalogue {
         .node::<flow::delay::Delay<Twist>>()
         .node::<flow::signal_generator::SignalGenerator>()
         .node::<flow::multisine::Multisine>()
-        .node::<flow::probe::Probe>();
-    #[cfg(feature = "cli")]
-    let catalogue = catalogue.lint(tool::lint);
-    catalogue
+        .node::<flow::probe::Probe>()
 }
