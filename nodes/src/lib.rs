@@ -52,7 +52,7 @@ use tactflow_runtime::signal::{Scalar, Twist};
 #[cfg(feature = "cli")]
 pub use tool::tool;
 
-/// The built-in files, the roles and the devices: one line each.
+/// The built-in files, the roles, the devices and the checks of whole graphs: one line each.
 fn edge() -> Catalogue {
     let catalogue = Catalogue::new()
         .files(builtin::FILES)
@@ -76,6 +76,8 @@ fn edge() -> Catalogue {
         .device::<devices::agni::Agni>()
         .device::<devices::lwr_fri::LwrFri>()
         .device::<devices::ur::Ur>();
+    #[cfg(feature = "cli")]
+    let catalogue = catalogue.lint(tool::lint);
     catalogue
 }
 

@@ -8,9 +8,14 @@ use std::sync::OnceLock;
 
 use crate::device::{Device, DeviceType, RoleType, device_type};
 use crate::node::{Node, NodeSpec, NodeType, of};
-use crate::source::BuiltinFile;
+use crate::outline::Outline;
+use crate::source::{BuiltinFile, Diagnostics};
 
 pub(crate) use limit_readers::LimitReaders;
+
+/// A check of whole graphs that knows what the nodes of a catalogue do: from the outline of a graph without mistakes, and
+/// the facts of its roles (`role.fact`), to warnings.
+pub type Lint = fn(&Outline, &[(String, toml::Value)]) -> Diagnostics;
 
 /// A list of node types, device types and roles. Catalogues can be joined, so that a crate can add its own to the
 /// shipped one.
@@ -27,6 +32,7 @@ pub struct Catalogue {
     devices: Vec<Box<dyn DeviceType>>,
     roles: Vec<RoleType>,
     files: Vec<BuiltinFile>,
+    lints: Vec<Lint>,
     limit_readers: OnceLock<LimitReaders>,
 }
 
@@ -113,6 +119,12 @@ impl Catalogue {
         self
     }
 
+    /// Adds a check of whole graphs.
+    pub fn lint(mut self, lint: Lint) -> Self {
+        self.lints.push(lint);
+        self
+    }
+
     /// Adds all entries of another catalogue.
     ///
     /// # Panics
@@ -134,6 +146,7 @@ impl Catalogue {
             self = self.role(role);
         }
         self.files.extend(other.files);
+        self.lints.extend(other.lints);
         self
     }
 
@@ -184,6 +197,11 @@ impl Catalogue {
     #[must_use]
     pub fn builtin_files(&self) -> &[BuiltinFile] {
         &self.files
+    }
+
+    /// Returns the checks of whole graphs.
+    pub(crate) fn lints(&self) -> &[Lint] {
+        &self.lints
     }
 
     /// Returns which parameters of limiters read which limits, as the built-in parts wire them.

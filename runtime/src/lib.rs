@@ -27,6 +27,7 @@ pub mod fault;
 pub mod graph;
 pub mod harness;
 pub mod node;
+mod outline;
 pub mod random;
 pub mod record;
 pub mod scenario;

@@ -64,6 +64,7 @@ mod paths;
 mod peer;
 mod points;
 mod policies;
+mod poor_controllers;
 mod quantities;
 mod rates;
 mod recordings;

@@ -7,6 +7,7 @@ mod doctor;
 mod explain;
 mod features;
 mod guided;
+mod lint;
 mod new;
 #[cfg(feature = "drivers")]
 mod pads;
@@ -19,6 +20,8 @@ mod tune;
 
 use tactflow_runtime::catalogue::Catalogue;
 use tactflow_runtime::cli::{Tool, derived};
+
+pub(crate) use lint::lint;
 
 /// Returns the tool with all commands, for a catalogue that includes that of this crate.
 pub fn tool(catalogue: Catalogue) -> Tool {

@@ -10,10 +10,10 @@ use crate::graph::check;
 use crate::graph::check::contact::ContactPorts;
 use crate::graph::check::generators::Generators;
 use crate::graph::compiled::Compiled;
-use crate::graph::load::{Loader, Request};
+use crate::graph::load::{FlatGraph, Loader, Request};
 use crate::graph::net::{Net, slow_down};
 use crate::graph::outline::OutlineBuilder;
-use crate::graph::plan::{Plan, PlannedCommand, PlannedMode, PlannedNode, PortRef};
+use crate::graph::plan::{AllowedWarning, Plan, PlannedCommand, PlannedMode, PlannedNode, PortRef};
 use crate::source::{Code, Diagnostics, Report, Severity, SourceMap};
 
 /// Checks and builds a graph.
@@ -91,15 +91,15 @@ pub(crate) fn compile_in(mut loader: Loader, catalogue: &Catalogue, request: &Re
     };
     let outline = outline.build();
     check::unused::check(&net, &modes, view.sources(), &mut warnings);
-    let mut warnings = sorted(check::parts::move_out(&flat, &sources, warnings));
-    let allowed = check::allow::silence(&flat, &mut warnings);
+    let facts = opened.facts(&net);
+    warnings.extend(catalogue.lints().iter().flat_map(|lint| lint(&outline, &facts)));
+    let (warnings, allowed) = settle(&flat, &sources, warnings);
     let view = view.plan(&net, &nodes, &ports);
     let shown: Vec<PortRef> = view.ports.iter().map(|port| port.source).collect();
     let reach = find_reach(&net, &nodes, &modes);
     let tasks = plan_tasks(&net, &ports, modes, (&starts, &shown), &gaps);
     let period = ((period * 1e9).round() as i64).max(1);
-    let (exports, facts, silences) =
-        (net.exports_by_name(), opened.facts(&net), check::silence::describe(&net, &opened));
+    let (exports, silences) = (net.exports_by_name(), check::silence::describe(&net, &opened));
     let to_commission = bench::to_commission(&net, &opened, &sources);
     let plan = Plan { roles, devices: opened.devices, nodes, commands, clock, period, tasks, reach, allowed };
     Ok(Compiled { plan, view, sources, warnings, outline, exports, facts, silences, to_commission })
@@ -113,6 +113,13 @@ fn check_wires(net: &Net<'_>, opened: &OpenedBench, diagnostics: &mut Diagnostic
     check::exports::check(net, diagnostics);
     check::delays::check(net, diagnostics);
     check::policy::check(net, diagnostics);
+}
+
+/// Returns the warnings that are left, and those that the graph or its bench allows.
+fn settle(flat: &FlatGraph, sources: &SourceMap, warnings: Diagnostics) -> (Diagnostics, Vec<AllowedWarning>) {
+    let mut warnings = sorted(check::parts::move_out(flat, sources, warnings));
+    let allowed = check::allow::silence(flat, &mut warnings);
+    (warnings, allowed)
 }
 
 /// Sorts warnings by their place. Several nodes may read the same number of [limits].

@@ -4,8 +4,8 @@ use std::collections::BTreeSet;
 
 use crate::device::Driver;
 use crate::graph::bench::CommissionedDevice;
-use crate::graph::outline::Outline;
 use crate::graph::plan::{AllowedWarning, Plan, PlannedNode, PlannedPort, PlannedTask, PlannedView, Producer};
+use crate::outline::Outline;
 use crate::source::{Code, Diagnostic, Report, SourceMap};
 
 /// A graph that was checked and built.

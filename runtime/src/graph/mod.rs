@@ -16,16 +16,16 @@ mod outline;
 mod plan;
 mod syntax;
 
+pub use crate::outline::{
+    NO_SPAN, Outline, OutlinedBlock, OutlinedMode, OutlinedPort, OutlinedRole, OutlinedTask, OutlinedWire,
+    OutlinedWord, Setting, ValueOrigin,
+};
 pub use bench::{BenchDevice, CommissionedDevice, OpenBench, open_bench};
 pub use compile::compile;
 pub(crate) use compile::compile_in;
 pub use compiled::Compiled;
 pub use load::Request;
 pub(crate) use load::{Loader, wrong_file_type};
-pub use outline::{
-    NO_SPAN, Outline, OutlinedBlock, OutlinedMode, OutlinedPort, OutlinedRole, OutlinedTask, OutlinedWire,
-    OutlinedWord, Setting, ValueOrigin,
-};
 pub use plan::{AllowedWarning, PlannedPort};
 pub(crate) use plan::{
     Clock, Condition, Plan, PlannedCommand, PlannedDevice, PlannedExit, PlannedModes, PlannedNode, PlannedRole,

@@ -1,12 +1,8 @@
-//! The outline of a graph, for `show`: parts are expanded, and every value has its origin in a file, a default or a
-//! fact.
+//! Builds the outline of a graph: what `show` prints and lints read.
 
 use std::cell::RefCell;
 use std::collections::BTreeMap;
-use std::ops::Range;
 use std::path::Path;
-
-use serde::Serialize;
 
 use crate::graph::bench::{OpenedBench, fill_facts};
 use crate::graph::load::{MeasuredValues, Task};
@@ -14,159 +10,11 @@ use crate::graph::net::{CommandWire, Net, Wire, WireOrigin};
 use crate::graph::plan::{PlannedNode, PlannedPort, PortRef};
 use crate::graph::syntax::{Block, GraphTable, LIMITS, PolicyTable};
 use crate::node::{FilePath, Param, ParamSpec, Repeats, Spanned};
-use crate::source::{Diagnostics, Item, Key, Location, SourceMap, Table, Value, parse_table};
-
-/// The span of a default inside a list of tables, which was not written anywhere.
-pub const NO_SPAN: Range<usize> = 0..0;
-
-/// A graph as it runs.
-#[derive(Debug, Clone, Default, Serialize)]
-pub struct Outline {
-    /// Nominal time between two ticks [s].
-    pub period_s: f64,
-    /// Section `[graph]`, without the bench.
-    #[serde(rename = "graph")]
-    pub settings: Vec<Setting>,
-    /// The roles, with their types and devices.
-    pub roles: Vec<OutlinedRole>,
-    /// The wires to the commands and the reports of roles: `role.command`.
-    pub commands: Vec<OutlinedWire>,
-    /// Section `[policy]`.
-    pub policy: Vec<Setting>,
-    /// The parts that are tasks.
-    #[serde(skip_serializing_if = "Vec::is_empty")]
-    pub tasks: Vec<OutlinedTask>,
-    /// The modes; those of a part that is a task have its name before theirs.
-    pub modes: Vec<OutlinedMode>,
-    /// The nodes, in the order in which they step.
-    pub nodes: Vec<OutlinedBlock>,
-    /// The devices that fill the roles.
-    pub devices: Vec<OutlinedBlock>,
-}
-
-/// A word of a graph file.
-#[derive(Debug, Clone, Serialize)]
-pub struct OutlinedWord {
-    /// The word.
-    pub text: String,
-    /// Its location.
-    pub place: Location,
-}
-
-/// A role and its device.
-#[derive(Debug, Clone, Serialize)]
-pub struct OutlinedRole {
-    /// Its name.
-    pub name: String,
-    /// Its type.
-    #[serde(rename = "type")]
-    pub kind: OutlinedWord,
-    /// The device that fills it.
-    pub device: OutlinedWord,
-}
-
-/// A part that is a task.
-#[derive(Debug, Clone, Serialize)]
-pub struct OutlinedTask {
-    /// Its full name.
-    pub name: String,
-    /// The keys of its section [graph] that hold in a part.
-    pub settings: Vec<Setting>,
-    /// Its section [policy]; without one, that of the file around it holds.
-    pub policy: Vec<Setting>,
-}
-
-/// A mode.
-#[derive(Debug, Clone, Serialize)]
-pub struct OutlinedMode {
-    /// Its name.
-    pub name: String,
-    /// `set.…` for each value that it sets, and its exits.
-    pub settings: Vec<Setting>,
-}
-
-/// A wire.
-#[derive(Debug, Clone, Serialize)]
-pub struct OutlinedWire {
-    /// Name of the input or the command.
-    pub name: String,
-    /// The port that it comes from: `node.port`.
-    pub source: String,
-    /// Maximum age of its value [ms], if it has one.
-    pub max_age_ms: Option<f64>,
-    /// Policy for an older value, if it has a maximum age.
-    pub stale: Option<&'static str>,
-    /// Where the wire is written.
-    pub place: Location,
-}
-
-/// A node or a device.
-#[derive(Debug, Clone, Serialize)]
-pub struct OutlinedBlock {
-    /// Its full name.
-    pub name: String,
-    /// Where its name is written.
-    pub place: Location,
-    /// Its type.
-    #[serde(rename = "type")]
-    pub kind: OutlinedWord,
-    /// The wires to its inputs.
-    #[serde(rename = "inputs")]
-    pub wires: Vec<OutlinedWire>,
-    /// Its parameters, in the order of the declaration.
-    #[serde(rename = "params")]
-    pub settings: Vec<Setting>,
-    /// The outputs of a node.
-    pub outputs: Vec<OutlinedPort>,
-}
-
-/// An output of a node.
-#[derive(Debug, Clone, Serialize)]
-pub struct OutlinedPort {
-    /// Its name: `node.port`.
-    pub name: String,
-    /// Its kind.
-    pub kind: &'static str,
-    /// Its unit, if all its values have the same.
-    pub unit: Option<String>,
-    /// Its frames, where they are known.
-    pub frames: Vec<Option<String>>,
-}
-
-/// A value of a section or a block.
-#[derive(Debug, Clone, Serialize)]
-pub struct Setting {
-    /// Dotted path in its block.
-    pub path: String,
-    /// The value, with numbers in the units of their parameters.
-    pub value: Value,
-    /// The value as written, if it has numbers with units.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub written: Option<Value>,
-    /// Where it comes from.
-    #[serde(flatten)]
-    pub origin: ValueOrigin,
-}
-
-/// Where a value comes from.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
-#[serde(tag = "origin", rename_all = "lowercase")]
-pub enum ValueOrigin {
-    /// A file or the command line.
-    Written {
-        /// Where the value is written.
-        place: Location,
-    },
-    /// The declaration of the parameter.
-    Default,
-    /// A fact of a device.
-    Fact {
-        /// The fact: `role.fact`.
-        fact: String,
-        /// Where the name of the device is written.
-        place: Location,
-    },
-}
+use crate::outline::{
+    NO_SPAN, Outline, OutlinedBlock, OutlinedMode, OutlinedPort, OutlinedRole, OutlinedTask, OutlinedWire,
+    OutlinedWord, Setting, ValueOrigin,
+};
+use crate::source::{Diagnostics, Item, Key, SourceMap, Table, Value, parse_table};
 
 /// Builds the outline of a graph without mistakes.
 pub(crate) struct OutlineBuilder<'a> {
@@ -243,7 +91,7 @@ impl OutlineBuilder<'_> {
         let spec = self.net.spec(planned.index)?;
         let wire = |wire: &Wire| self.wire(wire.key.name.clone(), wire.source, &wire.origin);
         let wires = self.net.wires[planned.index].iter().map(wire).collect();
-        let outputs = planned.ports.iter().map(OutlinedPort::of).collect();
+        let outputs = planned.ports.iter().map(outlined_port).collect();
         Some(OutlinedBlock {
             name: node.name.clone(),
             wires,
@@ -282,6 +130,7 @@ impl OutlineBuilder<'_> {
         Some(OutlinedBlock {
             name: block.key.name.clone(),
             place: self.sources.location(&block.key.span),
+            span: block.key.span.clone(),
             kind: self.word(block.kind.as_ref()?),
             wires: Vec::new(),
             settings: self.table(block.params.as_table(), specs, "", node),
@@ -431,20 +280,12 @@ impl OutlineBuilder<'_> {
     }
 }
 
-impl Setting {
-    fn default_of(path: String, value: Value) -> Self {
-        Self { path, value, written: None, origin: ValueOrigin::Default }
-    }
-}
-
-impl OutlinedPort {
-    fn of(port: &PlannedPort) -> Self {
-        Self {
-            name: port.name.clone(),
-            kind: port.shape.kind().name(),
-            unit: port.shape.unit().map(|unit| unit.to_string()),
-            frames: port.frames.clone(),
-        }
+fn outlined_port(port: &PlannedPort) -> OutlinedPort {
+    OutlinedPort {
+        name: port.name.clone(),
+        kind: port.shape.kind().name(),
+        unit: port.shape.unit().map(|unit| unit.to_string()),
+        frames: port.frames.clone(),
     }
 }
 

@@ -128,6 +128,28 @@ codes! {
     UnusualGain "unusual-gain",
     /// A gain that is too high for the period, so that a loop diverges.
     UnstableGain "unstable-gain",
+    /// A column that increases the error of its feature, or that does not change the feature.
+    WrongColumn "wrong-column",
+    /// A column that no mode selects, although its feature has gains.
+    UnusedColumn "unused-column",
+    /// A selected component that no column moves.
+    IdleAxis "idle-axis",
+    /// Gains with which a loop is near instability over a contact of the bench.
+    LowMargin "low-margin",
+    /// A filter whose delay takes most of the phase margin of a loop.
+    SlowFilter "slow-filter",
+    /// A derivative gain on a feature that no filter smooths.
+    UnfilteredDerivative "unfiltered-derivative",
+    /// An integral that grows without an effective bound.
+    Windup "windup",
+    /// A mode that rolls the sensor while nothing controls its force.
+    UnforcedRolling "unforced-rolling",
+    /// A position that is controlled along the line that a mode follows.
+    LinePosition "line-position",
+    /// A lost contact that is searched for faster than it was approached.
+    FastRecovery "fast-recovery",
+    /// A setpoint at or above a limit that holds for its feature.
+    UnreachableSetpoint "unreachable-setpoint",
     /// A sensor that starts outside its workspace.
     StartOutside "start-outside",
     /// A mode that waits for a contact and does not move toward it.
@@ -170,6 +192,17 @@ impl Code {
             | Self::ShortTime
             | Self::UnusualGain
             | Self::UnstableGain
+            | Self::WrongColumn
+            | Self::UnusedColumn
+            | Self::IdleAxis
+            | Self::LowMargin
+            | Self::SlowFilter
+            | Self::UnfilteredDerivative
+            | Self::Windup
+            | Self::UnforcedRolling
+            | Self::LinePosition
+            | Self::FastRecovery
+            | Self::UnreachableSetpoint
             | Self::StartOutside
             | Self::NoApproach
             | Self::LateExit

@@ -18,6 +18,7 @@ const RUNTIME: &[&str] = &[
     "signal",
     "node",
     "device",
+    "outline",
     "catalogue",
     "graph/syntax",
     "graph/load",

@@ -20,7 +20,7 @@ pub(crate) struct Law {
 }
 
 /// A feature that is controlled.
-#[derive(Debug, Serialize)]
+#[derive(Debug, Clone, Serialize)]
 pub(crate) struct Feature {
     pub(crate) name: String,
     /// Speed of each component for one unit of control, after the projectors.
@@ -45,7 +45,7 @@ pub(crate) struct Feature {
 }
 
 /// A filter of a feature.
-#[derive(Debug, Serialize)]
+#[derive(Debug, Clone, Serialize)]
 pub(crate) struct Filter {
     pub(crate) node: String,
     #[serde(rename = "type")]
@@ -141,7 +141,8 @@ fn feature(nodes: &Nodes<'_>, jacobian: &OutlinedBlock, name: String, column: [f
     };
     let pid = before(jacobian, "control", "pid");
     let gain = |which: &str| pid.and_then(|pid| nodes.number(pid, &format!("gains.{name}.{which}"))).unwrap_or(0.0);
-    let error = pid.and_then(|pid| before(pid, "error", "feature_error"));
+    let behind = pid.map(|pid| before(pid, "error", "deadband").unwrap_or(pid));
+    let error = behind.and_then(|node| before(node, "error", "feature_error"));
     let setpoint = error.and_then(|error| {
         let one = nodes.number(error, &format!("setpoint.{name}"));
         let table = || nodes.value(error, "setpoint")?.value.as_table()?.get(&name)?.read();

@@ -35,8 +35,18 @@ const SPAN: f64 = 1e-6;
 
 /// Sweeps a loop up to half of the rate of the graph.
 pub(crate) fn margins(around: &Loop) -> Margins {
+    swept(around, FREQUENCIES)
+}
+
+/// Returns the margins from a fifth of the frequencies. A narrow resonance shows too small: by less than 3 dB with a
+/// damping of 0.01 or more.
+pub(crate) fn rough_margins(around: &Loop) -> Margins {
+    swept(around, FREQUENCIES / 5)
+}
+
+fn swept(around: &Loop, frequencies: usize) -> Margins {
     let top = PI / around.period;
-    let open: Vec<(f64, Complex<f64>)> = sweep(top).map(|omega| (omega, around.open(omega))).collect();
+    let open: Vec<(f64, Complex<f64>)> = sweep(top, frequencies).map(|omega| (omega, around.open(omega))).collect();
     let crossings = crossings(&open);
     let one = Complex::from(1.0);
     let is_stable = !around.is_reversed() && is_stable(&open, around.integrators());
@@ -57,9 +67,9 @@ pub(crate) fn margins(around: &Loop) -> Margins {
 }
 
 /// Returns the circular frequencies of a sweep, from low to high [rad/s].
-fn sweep(top: f64) -> impl Iterator<Item = f64> {
-    let step = -libm::log(SPAN) / (FREQUENCIES - 1) as f64;
-    (0..FREQUENCIES).map(move |i| top * SPAN * libm::exp(step * i as f64))
+fn sweep(top: f64, frequencies: usize) -> impl Iterator<Item = f64> {
+    let step = -libm::log(SPAN) / (frequencies - 1) as f64;
+    (0..frequencies).map(move |i| top * SPAN * libm::exp(step * i as f64))
 }
 
 /// Returns the frequencies at which the gain is 1, with the response there.

@@ -1,9 +1,11 @@
 //! The control law of a graph in numbers: what moves an arm, and how stable its loops are.
 //!
 //! [`law`] multiplies gains, columns and projectors. [`response`] follows one feature around its loop, with the
-//! [`contacts`] that a bench declares, and [`margins`] says how far the loop is from instability.
+//! [`contacts`] that a bench declares, [`margins`] says how far the loop is from instability, and [`choose`] finds the
+//! largest gains that keep their margins.
 
 pub(super) mod chain;
+pub(super) mod choose;
 pub(super) mod contacts;
 pub(super) mod law;
 pub(super) mod margins;

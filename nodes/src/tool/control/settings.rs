@@ -1,31 +1,72 @@
 //! The nodes of a graph and their values in one mode.
 
+use std::collections::{BTreeMap, BTreeSet};
+
 use tactflow_runtime::graph::{Outline, OutlinedBlock, OutlinedMode, Setting};
 
 /// The exits of a mode, and when it fails: each key with its value as TOML.
 pub(crate) type Ends = Vec<(String, String)>;
 
+/// The nodes and modes of a graph, by name.
+pub(crate) struct Index<'a> {
+    outline: &'a Outline,
+    nodes: BTreeMap<&'a str, &'a OutlinedBlock>,
+    tasks: BTreeSet<&'a str>,
+    /// The modes of each task; that of the graph itself is "".
+    modes: BTreeMap<&'a str, Vec<&'a OutlinedMode>>,
+}
+
+impl<'a> Index<'a> {
+    pub(crate) fn new(outline: &'a Outline) -> Self {
+        let mut modes = BTreeMap::<&str, Vec<&OutlinedMode>>::new();
+        for mode in &outline.modes {
+            modes.entry(mode.name.rsplit_once('.').map_or("", |(task, _)| task)).or_default().push(mode);
+        }
+        Self {
+            outline,
+            nodes: outline.nodes.iter().map(|node| (&*node.name, node)).collect(),
+            tasks: outline.tasks.iter().map(|task| &*task.name).collect(),
+            modes,
+        }
+    }
+
+    /// Returns the task that a port is part of, the longest name that fits; "" for the graph itself.
+    pub(crate) fn task_of(&self, port: &str) -> &'a str {
+        let ends = port.rmatch_indices('.').map(|(end, _)| &port[..end]);
+        ends.filter_map(|name| self.tasks.get(name)).next().copied().unwrap_or_default()
+    }
+
+    /// Returns the modes of a task, or one `None` if it has none.
+    pub(crate) fn modes(&self, task: &str) -> Vec<Option<&'a OutlinedMode>> {
+        self.modes.get(task).map_or_else(|| vec![None], |modes| modes.iter().copied().map(Some).collect())
+    }
+}
+
 /// The nodes, with what a mode sets.
 #[derive(Clone, Copy)]
 pub(crate) struct Nodes<'a> {
-    outline: &'a Outline,
+    index: &'a Index<'a>,
     mode: Option<&'a OutlinedMode>,
 }
 
 impl<'a> Nodes<'a> {
-    pub(crate) const fn new(outline: &'a Outline, mode: Option<&'a OutlinedMode>) -> Self {
-        Self { outline, mode }
+    pub(crate) const fn new(index: &'a Index<'a>, mode: Option<&'a OutlinedMode>) -> Self {
+        Self { index, mode }
     }
 
     /// Returns the node that writes a port; `None` for the port of a role.
     pub(crate) fn writer(&self, port: &str) -> Option<&'a OutlinedBlock> {
-        let (name, _) = port.rsplit_once('.')?;
-        self.outline.nodes.iter().find(|node| node.name == name)
+        self.node(port.rsplit_once('.')?.0)
+    }
+
+    /// Returns the node with a name.
+    pub(crate) fn node(&self, name: &str) -> Option<&'a OutlinedBlock> {
+        self.index.nodes.get(name).copied()
     }
 
     /// Returns the nominal time between two ticks [s].
     pub(crate) const fn period(&self) -> f64 {
-        self.outline.period_s
+        self.index.outline.period_s
     }
 
     /// Returns the values of a node in this mode: those of its block, and over them those that the mode sets.
@@ -62,20 +103,6 @@ pub(crate) fn source<'a>(node: &'a OutlinedBlock, input: &str) -> Option<&'a str
 pub(crate) fn commands(outline: &Outline) -> impl Iterator<Item = (String, &str)> {
     let wires = outline.commands.iter().filter(|wire| wire.name.ends_with(".velocity"));
     wires.map(|wire| (wire.name.clone(), &*wire.source))
-}
-
-/// Returns the task that a port is part of, the longest name that fits; "" for the graph itself.
-pub(crate) fn task_of<'a>(outline: &'a Outline, port: &str) -> &'a str {
-    let is_inside = |task: &&str| port.strip_prefix(*task).is_some_and(|rest| rest.starts_with('.'));
-    let names = outline.tasks.iter().map(|task| &*task.name).filter(is_inside);
-    names.max_by_key(|name| name.len()).unwrap_or_default()
-}
-
-/// Returns the modes of a task, or one `None` if it has none.
-pub(crate) fn modes<'a>(outline: &'a Outline, task: &'a str) -> impl Iterator<Item = Option<&'a OutlinedMode>> {
-    let of = |mode: &&OutlinedMode| mode.name.rsplit_once('.').map_or("", |(task, _)| task) == task;
-    let modes: Vec<_> = outline.modes.iter().filter(of).map(Some).collect();
-    if modes.is_empty() { vec![None].into_iter() } else { modes.into_iter() }
 }
 
 /// Returns the exits of a mode.

@@ -12,7 +12,7 @@ use tactflow_runtime::graph::{Compiled, compile};
 
 use super::control::chain::{Limiter, chain};
 use super::control::law::{Law, law};
-use super::control::settings::{self, Ends, Nodes};
+use super::control::settings::{self, Ends, Index, Nodes};
 use stability::{Stability, stability};
 
 /// Print what moves the arm in each mode: gains, limits and delays
@@ -104,20 +104,19 @@ fn explain(compiled: &Compiled, port: Option<&str>) -> Result<Explained, String>
     if motions.is_empty() {
         return Err("no role is an arm, so nothing moves: name a port that carries a twist".into());
     }
-    let motions = motions.into_iter().map(|(of, port)| motion(compiled, of, port));
+    let index = Index::new(outline);
+    let motions = motions.into_iter().map(|(of, port)| motion(compiled, &index, of, port));
     Ok(Explained { period_s: outline.period_s, motions: motions.collect::<Result<_, _>>()? })
 }
 
-fn motion(compiled: &Compiled, of: String, port: &str) -> Result<Motion, String> {
-    let outline = compiled.outline();
-    let (limits, twist) = chain(&Nodes::new(outline, None), port)?;
-    let task = settings::task_of(outline, port);
-    let modes = settings::modes(outline, task).map(|mode| {
-        let nodes = Nodes::new(outline, mode);
+fn motion(compiled: &Compiled, index: &Index<'_>, of: String, port: &str) -> Result<Motion, String> {
+    let (limits, twist) = chain(&Nodes::new(index, None), port)?;
+    let modes = index.modes(index.task_of(port)).into_iter().map(|mode| {
+        let nodes = Nodes::new(index, mode);
         let law = law(&nodes, &twist);
         Ok(ModeLaw {
             mode: mode.map(|mode| mode.name.clone()),
-            loops: stability(compiled.facts(), &of, &law, outline.period_s)?,
+            loops: stability(compiled.facts(), &of, &law, nodes.period())?,
             law,
             ends: mode.map(settings::ends).unwrap_or_default(),
         })

@@ -1,6 +1,5 @@
 //! `tactflow tune`: measures how the features answer, and proposes gains with margins.
 
-mod choose;
 mod experiment;
 mod fit;
 mod page;
@@ -13,15 +12,15 @@ use std::path::PathBuf;
 use serde::Serialize;
 use tactflow_runtime::cli::clap::{self, ValueEnum};
 use tactflow_runtime::cli::{GraphArgs, Shell};
-use tactflow_runtime::graph::{Compiled, Outline, OutlinedMode, Request, compile};
+use tactflow_runtime::graph::{Compiled, OutlinedMode, Request, compile};
 
 use super::control::chain::chain;
+use super::control::choose::{Wanted, factor};
 use super::control::contacts::{Answer, Contact};
 use super::control::law::{Feature, law};
 use super::control::margins::{Margins, margins};
 use super::control::response::Loop;
-use super::control::settings::{self, Nodes};
-use choose::{Wanted, factor};
+use super::control::settings::{self, Index, Nodes};
 use experiment::{Answered, Experiment, Line};
 use fit::{ENOUGH, Fit, fit};
 use trial::Settled;
@@ -162,9 +161,10 @@ pub(super) fn run(args: TuneArgs, shell: &Shell) -> Result<u8, u8> {
 fn tune(args: &TuneArgs, shell: &Shell, request: &Request, compiled: &Compiled) -> Result<Tuned, Stop> {
     let outline = compiled.outline();
     let (command, port) = settings::commands(outline).next().ok_or("no role is an arm, so nothing moves".to_owned())?;
-    let (_, twist) = chain(&Nodes::new(outline, None), port)?;
-    let (mode, controlled) = controlled(args, outline, &twist)?;
-    let adder = adder(outline, &twist)?;
+    let index = Index::new(outline);
+    let (_, twist) = chain(&Nodes::new(&index, None), port)?;
+    let (mode, controlled) = controlled(args, &index, &twist)?;
+    let adder = adder(&index, &twist)?;
     let wanted = Wanted { peak: args.peak, gain_db: args.gain_margin, phase_deg: args.phase_margin };
     let benches: Vec<Option<PathBuf>> = [None].into_iter().chain(args.others.iter().cloned().map(Some)).collect();
     let (mut contacts, mut files) = (Vec::new(), Vec::new());
@@ -209,20 +209,16 @@ fn tune(args: &TuneArgs, shell: &Shell, request: &Request, compiled: &Compiled) 
 }
 
 /// Returns the mode that is tuned, and its features.
-fn controlled<'o>(
-    args: &TuneArgs,
-    outline: &'o Outline,
-    twist: &str,
-) -> Result<(&'o OutlinedMode, Vec<Feature>), String> {
-    let task = settings::task_of(outline, twist);
+fn controlled<'o>(args: &TuneArgs, index: &Index<'o>, twist: &str) -> Result<(&'o OutlinedMode, Vec<Feature>), String> {
+    let task = index.task_of(twist);
     if !task.is_empty() {
         return Err(format!("the arm follows the part `{task}`: tune the file of this part alone, on the same bench"));
     }
     let moving = |mode: &OutlinedMode| {
-        let law = law(&Nodes::new(outline, Some(mode)), twist);
+        let law = law(&Nodes::new(index, Some(mode)), twist);
         law.features.into_iter().filter(|feature| feature.moves() && feature.kp > 0.0).collect::<Vec<_>>()
     };
-    let modes: Vec<&OutlinedMode> = settings::modes(outline, task).flatten().collect();
+    let modes: Vec<&OutlinedMode> = index.modes(task).into_iter().flatten().collect();
     let mode = match &args.mode {
         Some(name) => modes.iter().find(|mode| mode.name == *name).ok_or_else(|| {
             let names: Vec<String> = modes.iter().map(|mode| format!("`{}`", mode.name)).collect();
@@ -247,8 +243,8 @@ fn controlled<'o>(
 }
 
 /// Returns the node that adds the test signal to the motion.
-fn adder(outline: &Outline, twist: &str) -> Result<String, String> {
-    let writer = Nodes::new(outline, None).writer(twist).filter(|node| node.kind.text == "twist_adder");
+fn adder(index: &Index<'_>, twist: &str) -> Result<String, String> {
+    let writer = Nodes::new(index, None).writer(twist).filter(|node| node.kind.text == "twist_adder");
     let help = "add one, so that the test signal has a way in:\n\n[nodes.sum]\ntype = \"twist_adder\"\nin.touch = ";
     writer
         .map(|node| node.name.clone())

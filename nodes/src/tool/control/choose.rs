@@ -2,18 +2,18 @@
 
 use serde::Serialize;
 
-use crate::tool::control::margins::{Margins, margins};
-use crate::tool::control::response::Loop;
+use super::margins::{Margins, margins};
+use super::response::Loop;
 
 /// What a loop must keep in the worst case.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub(super) struct Wanted {
+pub(crate) struct Wanted {
     /// Largest peak of the sensitivity [1].
-    pub(super) peak: f64,
+    pub(crate) peak: f64,
     /// Smallest gain margin [dB].
-    pub(super) gain_db: f64,
+    pub(crate) gain_db: f64,
     /// Smallest phase margin [deg].
-    pub(super) phase_deg: f64,
+    pub(crate) phase_deg: f64,
 }
 
 impl Default for Wanted {
@@ -24,7 +24,7 @@ impl Default for Wanted {
 
 impl Wanted {
     /// Returns whether a loop keeps them.
-    pub(super) fn holds(self, found: &Margins) -> bool {
+    pub(crate) fn holds(self, found: &Margins) -> bool {
         found.is_stable
             && found.peak_sensitivity <= self.peak
             && found.gain_db.is_none_or(|db| db >= self.gain_db)
@@ -39,7 +39,7 @@ const MAX_SHARE: f64 = 0.5;
 
 /// Returns the largest factor on all gains of a feature up to which each of its loops keeps the margins; `None` if there
 /// is none. With an integral, the margins do not hold for very small gains.
-pub(super) fn factor(loops: &[Loop], wanted: Wanted) -> Option<f64> {
+pub(crate) fn factor(loops: &[Loop], wanted: Wanted) -> Option<f64> {
     let share = |around: &Loop, factor: f64| around.proportional().abs() * around.period * factor;
     let is_tried = |factor: f64| loops.iter().all(|around| share(around, factor) < MAX_SHARE);
     let holds =

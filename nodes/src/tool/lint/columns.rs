@@ -1,0 +1,198 @@
+//! Columns: those that increase an error, those that change another feature, and those that nothing uses.
+
+use std::f64::consts::{FRAC_PI_2, PI};
+
+use tactflow_runtime::graph::OutlinedBlock;
+use tactflow_runtime::source::{Code, Diagnostic, Diagnostics, Edit, Item};
+
+use super::rows::{Answer, Row};
+use super::{Controlled, ModeLaw};
+use crate::tool::control::law::{COMPONENTS, Feature};
+use crate::tool::control::settings::{Nodes, source};
+
+/// Largest angle between a line and an axis of the sensor along which the line lies [rad].
+const ALONG: f64 = 0.35;
+
+pub(super) fn check(arm: &Controlled<'_>, found: &mut Diagnostics) {
+    for mode in &arm.modes {
+        found.extend(mode.moving().filter_map(|feature| wrong(arm, mode, feature)));
+        found.extend(idle(arm, mode));
+    }
+    found.extend(unused(arm));
+}
+
+/// Returns the warning about a column that increases the error of its feature, or that does not change the feature.
+fn wrong(arm: &Controlled<'_>, mode: &ModeLaw<'_>, feature: &Feature) -> Option<Diagnostic> {
+    let quantity = mode.quantity(feature)?;
+    let row = Row::of(quantity)?;
+    let column = mode.column(feature)?;
+    if !row.changes(&column) {
+        return foreign(mode, feature, quantity, column);
+    }
+    let is_reversed = |answer: &&Answer| {
+        // What the bench says about this object counts more than geometry.
+        let said = arm.contacts.iter().filter_map(|contact| contact.features.get(quantity));
+        let is_said = said.map(|answer| answer.row()).any(|row| row[answer.component] * answer.sign < 0.0);
+        feature.column[answer.component] * answer.sign < 0.0 && !is_said
+    };
+    let first = row.known.iter().find(is_reversed)?;
+    let name = COMPONENTS[first.component];
+    // Of what is not selected, too.
+    let mut right = column;
+    for answer in row.known {
+        right[answer.component] = answer.sign * column[answer.component].abs();
+    }
+    let message = format!(
+        "the column of `{}` increases its error: `{name}` is {}, but {}",
+        feature.name, column[first.component], first.reason
+    );
+    Some(replaced(mode, feature, message, right))
+}
+
+/// Returns the warning about a column that does not change its feature.
+fn foreign(mode: &ModeLaw<'_>, feature: &Feature, quantity: &str, column: [f64; 6]) -> Option<Diagnostic> {
+    let moved: Vec<String> =
+        (0..6).filter(|i| feature.column[*i] != 0.0).map(|i| format!("`{}`", COMPONENTS[i])).collect();
+    let moved = moved.join(" and ");
+    let row = Row::of(quantity)?;
+    // The feature whose column changes this one, and that this column changes.
+    let other = mode.law.features.iter().find_map(|other| {
+        let other_column = mode.column(other)?;
+        let other_row = Row::of(mode.quantity(other)?)?;
+        let is_exchanged =
+            row.changes(&other_column) && other_row.changes(&column) && !other_row.changes(&other_column);
+        is_exchanged.then_some((other, other_column))
+    });
+    if let Some((other, other_column)) = other {
+        let message = format!(
+            "the columns of `{}` and `{}` are exchanged: {moved} does not change `{}`",
+            feature.name, other.name, feature.name
+        );
+        // The second one of the pair would say the same.
+        let is_second = mode.place_of_column(other).start < mode.place_of_column(feature).start;
+        let diagnostic = replaced(mode, feature, message, other_column);
+        let place = mode.place_of_column(other);
+        let is_shown = other.moves();
+        return (!is_second || !is_shown).then(|| {
+            let help = format!(
+                "exchange them: `columns.{} = {}` and `columns.{} = {}`",
+                feature.name,
+                array(&other_column),
+                other.name,
+                array(&column)
+            );
+            let edit = Edit::Replace(place.clone(), array(&column));
+            diagnostic.edit(edit).help(help).note(place, "the other column")
+        });
+    }
+    let right: Vec<String> = row.known.iter().map(|answer| format!("`{}`", COMPONENTS[answer.component])).collect();
+    let message = format!("the column of `{}` moves {moved}, which does not change `{quantity}`", feature.name);
+    let help = format!("`{quantity}` answers to {}: write the entry there", right.join(" and "));
+    Some(Diagnostic::new(Code::WrongColumn, mode.place_of_column(feature), message).help(help))
+}
+
+/// Returns the warning about a column, with the right one as a fix.
+fn replaced(mode: &ModeLaw<'_>, feature: &Feature, message: String, right: [f64; 6]) -> Diagnostic {
+    let (place, right) = (mode.place_of_column(feature), array(&right));
+    let help = format!("write `columns.{} = {right}`", feature.name);
+    Diagnostic::new(Code::WrongColumn, place.clone(), message).help(help).edit(Edit::Replace(place, right))
+}
+
+/// Writes a column as TOML.
+fn array(column: &[f64; 6]) -> String {
+    let entries = column.map(|entry| format!("{}", entry + 0.0));
+    format!("[{}]", entries.join(", "))
+}
+
+/// Returns the projectors right behind an `inverse_jacobian`, with it.
+fn projectors<'a>(nodes: &Nodes<'a>, port: &str) -> Vec<(&'a OutlinedBlock, &'a OutlinedBlock)> {
+    let Some(node) = nodes.writer(port) else { return Vec::new() };
+    match node.kind.text.as_str() {
+        "twist_adder" => node.wires.iter().flat_map(|wire| projectors(nodes, &wire.source)).collect(),
+        "projector" => {
+            let behind = source(node, "twist").and_then(|twist| nodes.writer(twist));
+            behind
+                .filter(|behind| behind.kind.text == "inverse_jacobian")
+                .map(|behind| (node, behind))
+                .into_iter()
+                .collect()
+        }
+        _ => Vec::new(),
+    }
+}
+
+/// Returns the warnings about components that a projector selects and that no column moves.
+fn idle(arm: &Controlled<'_>, mode: &ModeLaw<'_>) -> Diagnostics {
+    let found = projectors(&mode.nodes, &arm.twist).into_iter().filter_map(|(projector, jacobian)| {
+        let setting = mode.nodes.value(projector, "select")?;
+        let select: [f64; 6] = setting.value.read()?;
+        // All components: the projector selects nothing.
+        if select.iter().all(|entry| *entry != 0.0) {
+            return None;
+        }
+        let settings = mode.nodes.values(jacobian).filter(|(path, _)| path.starts_with("columns."));
+        let columns: Vec<[f64; 6]> = settings.filter_map(|(_, setting)| setting.value.read()).collect();
+        let i = (0..6).find(|i| select[*i] != 0.0 && columns.iter().all(|column| column[*i] == 0.0))?;
+        let name = COMPONENTS[i];
+        let entries = match &setting.value.item {
+            Item::Array(entries) => entries.get(i),
+            _ => None,
+        };
+        let place = entries.map_or_else(|| setting.value.span.clone(), |entry| entry.span.clone());
+        let message = format!("`{}` selects `{name}`, but no column of `{}` moves it", projector.name, jacobian.name);
+        let help = format!("write 0 for `{name}`, or add an entry to the column of the feature that it should control");
+        let diagnostic = Diagnostic::new(Code::IdleAxis, place.clone(), message).help(help);
+        Some(match entries {
+            Some(_) => diagnostic.edit(Edit::Replace(place, "0".into())),
+            None => diagnostic,
+        })
+    });
+    found.collect()
+}
+
+/// Returns the warnings about columns that no mode uses, although their features have gains.
+fn unused(arm: &Controlled<'_>) -> Diagnostics {
+    let Some(first) = arm.modes.first() else { return Diagnostics::new() };
+    // Several nodes can turn the same control into motion.
+    let controls = |wanted: &Feature| {
+        let mut features = arm.modes.iter().flat_map(|mode| &mode.law.features);
+        features.any(|feature| feature.name == wanted.name && feature.pid == wanted.pid && feature.moves())
+    };
+    let features = first.law.features.iter().filter(|feature| feature.has_gain());
+    let dead = features.filter(|feature| !controls(feature) && !is_along_line(arm, feature));
+    let found = dead.filter_map(|feature| {
+        let column = first.column(feature)?;
+        let moved: Vec<String> = (0..6).filter(|i| column[*i] != 0.0).map(|i| format!("`{}`", COMPONENTS[i])).collect();
+        let (message, help) = match moved.is_empty() {
+            true => (
+                format!("the column of `{}` is zero, so its gains do nothing", feature.name),
+                "write how the sensor should move for it, or remove the feature".to_owned(),
+            ),
+            false => (
+                format!("no mode selects a component of the column of `{}`, so its gains do nothing", feature.name),
+                format!("select {} in a projector, or remove the feature", moved.join(" or ")),
+            ),
+        };
+        Some(Diagnostic::new(Code::UnusedColumn, first.place_of_column(feature), message).help(help))
+    });
+    found.collect()
+}
+
+/// Returns whether a feature is the position along a line whose direction the task controls. Such a position has no
+/// meaning where the line is longer than the pad, and a task is right to leave it out.
+fn is_along_line(arm: &Controlled<'_>, feature: &Feature) -> bool {
+    let is_along = |mode: &ModeLaw<'_>| line_axis(mode).is_some_and(|axis| mode.quantity(feature) == Some(axis));
+    arm.modes.iter().any(is_along)
+}
+
+/// Returns the position along the line that a mode holds at an angle, `x` or `y`; `None` without a line, or if it lies
+/// along neither axis.
+pub(super) fn line_axis(mode: &ModeLaw<'_>) -> Option<&'static str> {
+    let mut lines = mode.moving().filter(|feature| mode.quantity(feature) == Some("orientation"));
+    let angle = lines.find_map(|feature| feature.setpoint)?.rem_euclid(PI);
+    match angle {
+        _ if (angle - FRAC_PI_2).abs() < ALONG => Some("y"),
+        _ if !(ALONG..=PI - ALONG).contains(&angle) => Some("x"),
+        _ => None,
+    }
+}

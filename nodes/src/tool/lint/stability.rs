@@ -1,0 +1,200 @@
+//! Loops that are near instability over a contact, and filters that take their margin.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use tactflow_runtime::source::{Code, Diagnostic, Diagnostics, Edit};
+
+use super::{Controlled, ModeLaw};
+use crate::tool::control::choose::{Wanted, factor};
+use crate::tool::control::contacts::Contact;
+use crate::tool::control::law::{Feature, Filter};
+use crate::tool::control::margins::{Margins, margins, rough_margins};
+use crate::tool::control::response::Loop;
+use crate::tool::control::shape::Shape;
+
+/// What a loop has to keep over each contact.
+const KEPT: Wanted = Wanted { peak: 1.8, gain_db: 8.0, phase_deg: 0.0 };
+/// Margins that the rough sweep may show too large, and that still keep [`KEPT`].
+const AMPLE: Wanted = Wanted { peak: 1.4, gain_db: 12.0, phase_deg: 55.0 };
+/// Lag of the filters where the gain is 1, of which a loop with less than [`GOOD_PHASE`] is warned: a third of the
+/// quarter turn that an integrator leaves [deg].
+const MAX_LAG: f64 = 30.0;
+/// Phase margin from which on no filter is too slow [deg].
+const GOOD_PHASE: f64 = 50.0;
+/// Delay of filters from which on they are the cause of a low margin: that of a loop with the usual 3.5 1/s [s].
+const SLOW: f64 = 0.25;
+/// Gain of one period at which `pid` itself warns [1].
+const DIVERGES: f64 = 2.0;
+
+/// A loop over a contact that was not ample.
+struct Found<'a> {
+    object: &'a str,
+    margins: Margins,
+    /// Lag of the filters where the gain is 1 [deg].
+    lag: f64,
+}
+
+pub(super) fn check(arm: &Controlled<'_>, found: &mut Diagnostics) {
+    let geometry = [Contact { object: String::new(), latency_ms: 0.0, features: BTreeMap::new() }];
+    let contacts = if arm.contacts.is_empty() { &geometry[..] } else { &arm.contacts[..] };
+    // Most modes have the same loops.
+    let mut seen = BTreeSet::new();
+    for mode in &arm.modes {
+        let period = mode.nodes.period();
+        for feature in mode.moving().filter(|feature| feature.kp > 0.0 && feature.kp * period < DIVERGES) {
+            if mode.quantity(feature).is_some() && seen.insert(key(feature)) {
+                found.extend(judge(mode, feature, contacts));
+            }
+        }
+    }
+}
+
+/// Returns what makes the loops of two features the same.
+fn key(feature: &Feature) -> (String, String, Vec<u64>) {
+    let Feature { kp, ki, kd, .. } = *feature;
+    let numbers = feature.column.into_iter().chain([kp, ki, kd]);
+    let delays = feature.filters.iter().map(|filter| filter.delay_s);
+    (feature.jacobian.clone(), feature.name.clone(), numbers.chain(delays).map(f64::to_bits).collect())
+}
+
+fn judge(mode: &ModeLaw<'_>, feature: &Feature, contacts: &[Contact]) -> Option<Diagnostic> {
+    let period = mode.nodes.period();
+    let loops = contacts.iter().filter_map(|contact| Some((contact, Loop::over(feature, contact, period)?)));
+    let loops: Vec<(&Contact, Loop)> = loops.filter(|(_, around)| !around.is_reversed()).collect();
+    let all: Vec<Found<'_>> = loops
+        .iter()
+        .filter(|(_, around)| !AMPLE.holds(&rough_margins(around)))
+        .map(|(contact, around)| {
+            let margins = margins(around);
+            let lag = margins.crossover_hz.map_or(0.0, |hz| lag(feature, hz, period));
+            Found { object: &contact.object, margins, lag }
+        })
+        .collect();
+    let peak =
+        |found: &&Found<'_>| if found.margins.is_stable { found.margins.peak_sensitivity } else { f64::INFINITY };
+    let worst = |is: &dyn Fn(&Found<'_>) -> bool| {
+        all.iter().filter(|found| is(found)).max_by(|one, other| peak(one).total_cmp(&peak(other)))
+    };
+    let low = worst(&|found| !KEPT.holds(&found.margins));
+    let is_slow = |found: &Found<'_>| {
+        let has_phase = found.margins.is_stable && found.margins.phase_deg.is_none_or(|phase| phase >= GOOD_PHASE);
+        found.lag > MAX_LAG && !has_phase
+    };
+    let slow = worst(&is_slow).filter(|_| low.is_none() || feature.delay() > SLOW);
+    match (slow, low) {
+        (Some(slow), _) => slow_filter(mode, feature, contacts, slow),
+        (_, Some(low)) => Some(low_margin(mode, feature, &loops, low)),
+        _ => None,
+    }
+}
+
+/// Returns the lag of the filters of a feature at a frequency [deg].
+fn lag(feature: &Feature, hz: f64, period: f64) -> f64 {
+    let omega = 2.0 * std::f64::consts::PI * hz;
+    feature.filters.iter().map(|filter| -filter.shape.response(omega, period).arg().to_degrees()).sum()
+}
+
+/// Returns how a message names a contact.
+fn over(object: &str) -> String {
+    if object.is_empty() { "by geometry alone".into() } else { format!("over `{object}`") }
+}
+
+/// Returns the margins of a loop for a message.
+fn figures(margins: &Margins) -> String {
+    let peak = format!("the peak of its sensitivity is {:.1}", margins.peak_sensitivity);
+    match margins.gain_db {
+        Some(db) => format!("{peak}, and its gain margin {db:.1} dB"),
+        None => peak,
+    }
+}
+
+fn low_margin(mode: &ModeLaw<'_>, feature: &Feature, loops: &[(&Contact, Loop)], low: &Found<'_>) -> Diagnostic {
+    let (name, place) = (&feature.name, mode.place_of_gain(feature, "kp"));
+    let message = match low.margins.is_stable {
+        true => format!("the loop of `{name}` is near instability {}: {}", over(low.object), figures(&low.margins)),
+        false => format!("the loop of `{name}` is unstable {}", over(low.object)),
+    };
+    let diagnostic = Diagnostic::new(Code::LowMargin, place, message);
+    let loops: Vec<Loop> = loops.iter().map(|(_, around)| around.clone()).collect();
+    let Some(factor) = factor(&loops, KEPT).filter(|factor| *factor < 1.0) else {
+        return diagnostic
+            .help("no gain keeps the margins: use faster filters, or a smaller `ki` in proportion to `kp`");
+    };
+    let gains = [("kp", feature.kp), ("ki", feature.ki), ("kd", feature.kd)];
+    let gains = gains.map(|(key, gain)| (key, rounded_down(gain * factor)));
+    let written = gains.iter().filter(|(_, gain)| *gain != 0.0);
+    let text: Vec<String> = written.clone().map(|(key, gain)| format!("`{key} = {gain}`")).collect();
+    let help = format!("write {} or less in the gains of `{name}`", text.join(" and "));
+    let places: Vec<_> = written.map(|(key, gain)| (mode.place_of_gain(feature, key), gain)).collect();
+    places.into_iter().fold(diagnostic.help(help), |diagnostic, (place, gain)| {
+        diagnostic.edit(Edit::Replace(place, format!("{gain:?}")))
+    })
+}
+
+/// Returns a number with two digits that is not larger.
+fn rounded_down(number: f64) -> f64 {
+    if number <= 0.0 {
+        return 0.0;
+    }
+    let digits = 1.0 - libm::floor(libm::log10(number));
+    let scale = libm::pow(10.0, digits);
+    let exact = libm::floor(number * scale) / scale;
+    // To the nearest number with few digits.
+    format!("{exact:.4}").parse().unwrap_or(exact)
+}
+
+fn slow_filter(mode: &ModeLaw<'_>, feature: &Feature, contacts: &[Contact], slow: &Found<'_>) -> Option<Diagnostic> {
+    let filters = feature.filters.iter().enumerate();
+    let (i, slowest) = filters.max_by(|(_, one), (_, other)| one.delay_s.total_cmp(&other.delay_s))?;
+    let node = mode.nodes.node(&slowest.node)?;
+    let keys = ["time_constant_ms", "cutoff_hz", "window_ms", "window"];
+    let key = keys.into_iter().find(|key| mode.nodes.number(node, key).is_some());
+    let name = &feature.name;
+    let left = match slow.margins.phase_deg.filter(|_| slow.margins.is_stable) {
+        Some(phase) => format!("a phase margin of {phase:.0}° is left"),
+        None => "the loop is unstable".into(),
+    };
+    let message = format!(
+        "the filters of `{name}` take {:.0}° of the phase where the gain of its loop is 1, and {left} {}: `{}` delays it by \
+         {:.0} ms",
+        slow.lag,
+        over(slow.object),
+        slowest.node,
+        slowest.delay_s * 1e3
+    );
+    let place = mode.place(&slowest.node, key.unwrap_or_default());
+    let diagnostic = Diagnostic::new(Code::SlowFilter, place.clone(), message);
+    let faster = key.and_then(|key| Some((key, faster(mode, feature, contacts, i)? * mode.nodes.number(node, key)?)));
+    Some(match faster {
+        Some((key @ ("time_constant_ms" | "window_ms"), value)) => {
+            let value = rounded_down(value);
+            let help = format!("write `{key} = {value}` or less, or smaller gains of `{name}`");
+            let diagnostic = diagnostic.help(help);
+            // A default is written nowhere, so it has no text to replace.
+            if place == node.span { diagnostic } else { diagnostic.edit(Edit::Replace(place, format!("{value}"))) }
+        }
+        _ => diagnostic.help("use a faster filter, or smaller gains"),
+    })
+}
+
+/// Returns the part of the delay of a filter with which the loop is good over all contacts.
+fn faster(mode: &ModeLaw<'_>, feature: &Feature, contacts: &[Contact], i: usize) -> Option<f64> {
+    let period = mode.nodes.period();
+    let is_good = |feature: &Feature| {
+        let loops = contacts.iter().filter_map(|contact| Loop::over(feature, contact, period));
+        loops.map(|around| margins(&around)).all(|found| {
+            let is_fast = || found.crossover_hz.is_none_or(|hz| lag(feature, hz, period) <= MAX_LAG);
+            KEPT.holds(&found) && (is_fast() || found.phase_deg.is_none_or(|phase| phase >= GOOD_PHASE))
+        })
+    };
+    let shares = std::iter::successors(Some(0.8), |share| Some(share * 0.8)).take(20);
+    shares.into_iter().find(|share| {
+        let mut feature = feature.clone();
+        let Filter { shape, .. } = &mut feature.filters[i];
+        match shape {
+            Shape::LowPass { time } => *time *= share,
+            Shape::Mean { samples } | Shape::Median { samples } => *samples = (*samples * share).max(1.0),
+        }
+        is_good(&feature)
+    })
+}
