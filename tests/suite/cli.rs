@@ -232,7 +232,7 @@ fn a_mistake_in_set_points_into_set() {
 
 #[test]
 fn rows_are_read_by_a_reader_that_is_not_ours_and_say_the_same_in_both_formats() {
-    for (graph, rows) in [(PRESS, "309 rows, 171 columns, "), (HYBRID, "1000 rows, 182 columns, ")] {
+    for (graph, rows) in [(PRESS, "309 rows, 172 columns, "), (HYBRID, "1000 rows, 183 columns, ")] {
         let [csv, ndjson] = ["rows.csv", "rows.ndjson"].map(|name| {
             let (_folder, path) = in_new_folder(name);
             let bench = if graph == HYBRID { &[MOCK][..] } else { &[] };

@@ -107,6 +107,7 @@ mod tests {
             max_age: 100,
             accelerations: accelerations.into(),
             follows: false,
+            maker: None,
         };
         let mut description = Description::every(1.0);
         let joints = JointsShape { joints: vec![Default::default(); 2], ..Default::default() };

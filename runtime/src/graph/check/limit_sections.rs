@@ -136,6 +136,7 @@ fn unread(net: &Net<'_>) -> Vec<Diagnostic> {
             path.iter().flat_map(|stop| readers.limits_of(&stop.spec.name).map(move |limit| (stop.node, limit)));
         let stated = limits.filter(|(_, limit)| net.limit(&[wire.role], limit).is_some());
         let is_read = |limit: &str| path.iter().any(|stop| enforces(net, stop.node, limit));
+        let stated = stated.filter(|(node, _)| !has_unknown_key(net, *node));
         let mut open: Vec<(usize, &str)> = stated.filter(|(_, limit)| !is_read(limit)).collect();
         open.dedup();
         found.extend(open.into_iter().map(|(node, limit)| report_unread(net, node, limit)));
@@ -154,6 +155,14 @@ fn enforces(net: &Net<'_>, node: usize, limit: &str) -> bool {
         let is_certain = fact.is_none_or(|fact| !fact.is_optional || fact.word == format!("{LIMITS}.{limit}"));
         is_for_limit && is_certain
     })
+}
+
+/// Returns whether a limiter has a key that is no parameter. That has a message of its own, and the key that was meant may
+/// be the one that reads the limit.
+fn has_unknown_key(net: &Net<'_>, node: usize) -> bool {
+    let known = net.spec(node).map_or(&[][..], |spec| &spec.params);
+    let mut keys = net.flat.nodes[node].block.params.as_table().into_iter().flat_map(|table| &table.entries);
+    keys.any(|(key, _)| known.iter().all(|param| param.name != key.name))
 }
 
 fn report_unread(net: &Net<'_>, node: usize, limit: &str) -> Diagnostic {
