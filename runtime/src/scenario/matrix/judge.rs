@@ -43,6 +43,8 @@ const SEARCH_M_PER_S: f64 = 0.0052;
 const STILL_M_PER_S: f64 = 1e-4;
 /// Time at the end of a run in which a contact must be there [s].
 const END_S: f64 = 0.5;
+/// By how much a fault may delay a touch [s].
+const DELAY_S: f64 = 1.0;
 
 /// What was done to a run.
 #[derive(Debug, Clone, Copy)]
@@ -93,15 +95,16 @@ pub(super) fn judge(scene: &Scene, strike: Strike<'_>, [reference, run]: [&Run; 
     Attack { severity, inject, fate, cause, force_n, bound_n, rest_s, way_mm, broken }
 }
 
-/// Whether the first pad is without a contact at the end, although it has one then without the fault.
+/// Whether the first pad is without a contact at the end, although it has one then without the fault. One that has only
+/// just begun does not count: a fault may delay a touch.
 fn has_lost(reference: &Run, run: &Run) -> bool {
     let end = run.moments.last().map_or(0.0, |moment| moment.time);
-    let touches = |run: &Run| {
-        let last = run.moments.last().map_or(0.0, |moment| moment.time).min(end);
+    let touches = |run: &Run, before: f64| {
+        let last = run.moments.last().map_or(0.0, |moment| moment.time).min(end) - before;
         let near = |moment: &&Moment| moment.time <= last && moment.time > last - END_S;
         run.moments.iter().filter(near).any(|moment| moment.sides[0].force > 0.0)
     };
-    touches(reference) && !touches(run)
+    touches(reference, 0.0) && touches(reference, DELAY_S) && !touches(run, 0.0)
 }
 
 /// Returns how the commanded motion of a sensor exceeds its limits.
@@ -280,6 +283,16 @@ mod tests {
             broken("lost commands", Phase::Steady, &standing)
                 .contains(&"the run has ended without a named cause".to_owned())
         );
+    }
+
+    #[test]
+    fn a_contact_is_lost_if_it_is_missing_at_the_end_and_a_late_touch_is_no_loss() {
+        let touched = |from: f64, to: f64| run(|time| f64::from(u8::from((from..to).contains(&time))), |_| 0.0);
+        assert!(has_lost(&touched(1.0, 9.0), &touched(1.0, 4.0)));
+        assert!(!has_lost(&touched(1.0, 9.0), &touched(1.0, 4.8)), "in the last half second");
+        assert!(!has_lost(&touched(4.4, 9.0), &touched(9.0, 9.0)), "it may touch a little later");
+        assert!(has_lost(&touched(3.4, 9.0), &touched(9.0, 9.0)), "not that much later");
+        assert!(!has_lost(&touched(1.0, 4.0), &touched(1.0, 3.0)), "nor has it one without the fault");
     }
 
     #[test]
