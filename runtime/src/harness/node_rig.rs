@@ -139,6 +139,7 @@ impl NodeRig {
 
     /// Runs the tick, then lets `ms` milliseconds pass.
     pub fn step_ms(&mut self, ms: f64) {
+        self.runner.is_overruled = self.tick.is_overruled;
         self.runner.visit(&mut self.tick, &mut self.bus);
         let nanos = (ms * 1e6) as i64;
         self.tick =

@@ -104,8 +104,9 @@ pub struct Params {
     /// Whether the robot may move in the safety mode `reduced`.
     #[param(default = false)]
     allow_reduced: bool,
-    /// Lowest position of the speed slider at which the robot is moved. A lower one slows every motion.
-    #[param(unit = "1", range = 0.01..=1.0, default = 1.0)]
+    /// Lowest position of the speed slider at which the robot is moved. A lower one slows every motion. Below 0.2 a joint
+    /// that moves cannot be told from one that is stuck.
+    #[param(unit = "1", range = 0.2..=1.0, default = 1.0)]
     min_speed_fraction: f64,
     /// Pose of the tool centre point in the flange, x, y, z and a rotation vector, for a robot that does not report it.
     #[param(unit = "m, rad")]

@@ -37,9 +37,10 @@ pub use limiter::Limiter;
 /// its range.
 ///
 /// **A joint that does not follow** ends the task with a fault, because its motion is no longer the one that the limiters
-/// before it have let pass. The equilibrium must move as the commands say: a joint that was told more than 4 mrad and has
-/// made less than a quarter of it for 300 ms is stuck. The commands must act within 100 ms. A command that the arm does
-/// not get, as at a halt, does not count.
+/// before it have let pass. The equilibrium must move as the commands say: a joint is stuck if it makes less than a tenth
+/// of a way of 4 mrad (4 mm for a prismatic joint). The commands must act within 100 ms, or four times the graph's
+/// `max_gap_ms` if that is longer, and a robot that its operator slows down must keep 15 % of its speed. A command that the
+/// arm does not get, as at a halt, does not count.
 ///
 /// Each scalar beside the velocity is 1 while the limit of that name does not act.
 ///
@@ -155,10 +156,11 @@ impl Node for JointLimit {
     }
 
     fn found(&self, state: &State) -> Option<String> {
-        let (joint, [told, way]) = state.following.stuck()?;
+        let (joint, [commanded, way]) = state.following.stuck()?;
         let name = &self.joints[joint].name;
         Some(format!(
-            "joint `{name}` does not follow its commands: it was told {told:.4} rad and has moved {way:.4} rad"
+            "joint `{name}` does not follow its commands: it was commanded by {commanded:.4} and has moved by {way:.4} (rad, \
+             or m if prismatic); check its brake and its drive, and that the device states the equilibrium"
         ))
     }
 

@@ -44,6 +44,8 @@ pub struct Course {
     missing_since: Option<i64>,
     /// Since when nothing has touched the pad, not even for a frame, if that contact is missing.
     untouched_since: Option<i64>,
+    /// Whether the arm has begun to search for that contact.
+    searches: bool,
 }
 
 impl Course {
@@ -56,7 +58,7 @@ impl Course {
         if lasts && (self.touched_since.is_none() || self.missing_since.is_some()) {
             let is_same = self.missing_since.zip(self.set_since).is_some_and(|(end, set)| set - end <= SAME_CONTACT_NS);
             let touched_since = self.touched_since.filter(|_| is_same).or(Some(now));
-            *self = Self { touched_since, missing_since: None, untouched_since: None, ..*self };
+            *self = Self { touched_since, set_since: self.set_since, ..Self::default() };
         } else if flickers {
             (self.missing_since, self.untouched_since) = (None, None);
         }
@@ -71,16 +73,21 @@ impl Course {
         }
         let (gap, is_bounce) = (now - missing, missing - touched < FIRST_TOUCH_NS);
         let rested = now - self.untouched_since.unwrap_or(missing);
-        if !touches && gap < times.debounce {
+        let phase = if !touches && gap < times.debounce {
             Phase::Barred
-        } else if touches || is_bounce {
+        } else if is_bounce {
             Phase::Search
+        } else if touches {
+            // It has not lasted yet.
+            if self.searches { Phase::Search } else { Phase::Barred }
         } else if is_leaning {
             Phase::Retreat
         } else if rested < times.wait {
             Phase::Rest
         } else {
             Phase::Search
-        }
+        };
+        self.searches = phase == Phase::Search;
+        phase
     }
 }

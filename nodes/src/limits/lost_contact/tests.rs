@@ -134,7 +134,8 @@ fn a_touch_for_a_moment_begins_the_rest_anew() {
     let mut cell = Cell::new();
     cell.run(2000.0, true, 0.0);
     cell.run(400.0, false, 0.0);
-    cell.run(20.0, true, 0.0);
+    let during = cell.run(20.0, true, 0.0);
+    assert!(during.iter().all(|twist| !is_into_the_object(twist)), "{during:?}");
     let after = cell.run(596.0, false, 0.0);
     assert!(after.iter().all(|twist| !is_into_the_object(twist)), "{after:?}");
     assert!(cell.run(8.0, false, 0.0).last().is_some_and(is_into_the_object), "then it searches");

@@ -25,11 +25,8 @@ fn unfiltered(mode: &ModeLaw<'_>, feature: &Feature) -> Option<Diagnostic> {
         "`kd` of `{name}` differentiates a signal without a filter: the noise of a sample moves the sensor with a gain of \
          {factor:.1} 1/s"
     );
-    let port = feature.measured.as_deref().unwrap_or_default();
-    let help = format!(
-        "remove `kd`, or put a filter between `{port}` and the error:\n[nodes.smooth_{name}]\ntype = \"low_pass\"\n\
-         in.value = \"{port}\"\ntime_constant_ms = 20"
-    );
+    let help =
+        format!("remove `kd`, or put a `low_pass` with `time_constant_ms = 20` on the wire that measures `{name}`");
     Some(Diagnostic::new(Code::UnfilteredDerivative, mode.place_of_gain(feature, "kd"), message).help(help))
 }
 

@@ -74,8 +74,9 @@ pub(crate) fn lint(outline: &Outline, facts: &[(String, toml::Value)]) -> Diagno
 fn without_consequences(mut found: Diagnostics) -> Diagnostics {
     let has = |code: Code| found.iter().any(|one| one.code == code);
     let (has_wrong, rolls) = (has(Code::WrongColumn), has(Code::UnforcedRolling));
+    let has_unused = has(Code::UnusedColumn);
     found.retain(|one| match one.code {
-        Code::IdleAxis => !has_wrong,
+        Code::IdleAxis => !has_wrong && !has_unused,
         Code::UnusedColumn => !has_wrong && !rolls,
         _ => true,
     });
@@ -145,7 +146,7 @@ impl ModeLaw<'_> {
 
     /// Returns the start of a message about this mode.
     fn named(&self) -> String {
-        self.mode.map(|mode| format!("in mode `{}` ", mode.name)).unwrap_or_default()
+        self.mode.map(|mode| format!("in mode `{}`, ", mode.name)).unwrap_or_default()
     }
 
     /// Returns the features that move the arm, and whose gains have the right sign.

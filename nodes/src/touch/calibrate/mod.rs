@@ -48,7 +48,8 @@ use tare::{Averages, Rules};
 /// counts, so that an impact costs one frame. A pad whose self-test saw noise never sends one image three times in a
 /// row: then the images are absent, and after 25 such frames the task ends with a fault. A pad that repeats its readings
 /// at rest may repeat them. A pad whose zero sinks hides a force: with a self-test and a `tare_bound`, the task ends with
-/// a fault if more than a quarter of the readings are below their zeros by more than the bound, for 24 frames.
+/// a fault if more than a quarter of the live readings are below their zeros by more than the bound, in three looks that
+/// are 8 frames apart.
 ///
 /// **Tare.** The zero of foam drifts. When `in.tare` becomes set, the mean of the next `tare_window` frames becomes the
 /// zero of each tactel; with `tare_at_start` the mean of the first frames does. A pad is only tared while nothing
@@ -279,8 +280,10 @@ impl Node for Calibrate {
             Some(rules) if image.is_new() => rules.judge(&inputs, &state.rest, &mut state.frames),
             _ => Frame::Good,
         };
-        let bound = self.test.as_ref().and_then(|test| test.bound).filter(|_| image.is_new());
-        let has_sunk = bound.is_some_and(|bound| state.sinking.look(image.cells(), &state.rest.zeros, bound));
+        let counts = image.is_new() && frame == Frame::Good && state.rest.verdict == Verdict::Passed;
+        let bound = self.test.as_ref().and_then(|test| test.bound).filter(|_| counts);
+        let is_dead = |i: usize| self.curves.is_dead(i);
+        let has_sunk = bound.is_some_and(|bound| state.sinking.look(image.cells(), &state.offset, bound, is_dead));
         let late = if frame == Frame::Stuck { Some(Verdict::Stuck) } else { has_sunk.then_some(Verdict::Sunk) };
         if let Some(verdict) = late.filter(|_| state.rest.verdict == Verdict::Passed) {
             state.rest.verdict = verdict;

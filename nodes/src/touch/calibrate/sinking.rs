@@ -1,15 +1,15 @@
 //! Whether the zero of a pad sinks during a task: the readings then hide a force from the ceilings.
 //!
-//! Nothing that presses on a pad lowers a reading. So the tactels that nothing touches tell, however hard others are
-//! pressed.
+//! Nothing that presses on a pad lowers a reading. A pad that sinks shows in the tactels that nothing touches, however
+//! hard others are pressed.
 
 use tactflow_runtime::node::State;
 
 /// The pad is looked at in one of so many new frames.
 const EVERY: u32 = 8;
-/// The pad has sunk if one of so many tactels is below its zero.
+/// The pad has sunk if more than a quarter of its live tactels are below their zeros...
 const SHARE: usize = 4;
-/// And if that is so for so many looks in a row.
+/// ...in so many looks in a row.
 const LOOKS: u32 = 3;
 
 /// What was seen of the readings below their zeros.
@@ -22,13 +22,18 @@ pub(super) struct Sinking {
 }
 
 impl Sinking {
-    /// Looks at a new frame. Returns whether the pad has sunk by more than `bound` below the zeros.
-    pub(super) fn look(&mut self, cells: &[f32], zeros: &[f32], bound: f64) -> bool {
+    /// Looks at a new frame that counts. `is_dead` are the tactels that the calibration excludes. Returns whether the pad
+    /// has sunk by more than `bound` below the zeros.
+    pub(super) fn look(&mut self, cells: &[f32], zeros: &[f32], bound: f64, is_dead: impl Fn(usize) -> bool) -> bool {
         self.frames = (self.frames + 1) % EVERY;
         if self.frames == 0 {
             let bound = bound as f32;
-            let below = cells.iter().zip(zeros).map(|(cell, zero)| usize::from(zero - cell > bound)).sum::<usize>();
-            self.looks = if below * SHARE > cells.len() { self.looks + 1 } else { 0 };
+            let (mut below, mut live) = (0, 0);
+            for (_, (cell, zero)) in cells.iter().zip(zeros).enumerate().filter(|(i, _)| !is_dead(*i)) {
+                live += 1;
+                below += usize::from(zero - cell > bound);
+            }
+            self.looks = if below * SHARE > live { self.looks + 1 } else { 0 };
         }
         self.looks >= LOOKS
     }
@@ -79,6 +84,24 @@ mod tests {
         assert_eq!(rig.get::<bool>("failed"), Some(&true));
         assert!(rig.found().unwrap().contains("have sunk below their zeros"), "{:?}", rig.found());
         assert_eq!(show(&mut rig, [0.0; 8], 8), 0, "it stays out of use");
+    }
+
+    #[test]
+    fn dead_tactels_do_not_count() {
+        let mut rig = tested("tare_bound = 50.0\ndead = [[1, 0], [1, 1], [1, 2], [1, 3]]");
+        assert_eq!(show(&mut rig, sunk(1), 100), 100, "a quarter of the live ones");
+        assert!(show(&mut rig, sunk(2), 32) < 32);
+    }
+
+    #[test]
+    fn the_zeros_of_the_last_tare_count() {
+        let image: Shape = ImageShape { rows: 2, cols: 4, pitch: [0.005; 2], unit: Unit::RAW }.into();
+        let params = "offset = 100.0\nrest_frames = 8\ntare_bound = 50.0\ntare_window = 8\ntare_at_start = true";
+        let mut rig = NodeRig::new::<Calibrate>(params, &[("image", image)]).unwrap();
+        show(&mut rig, [40.0; 8], 8);
+        show(&mut rig, [-40.0; 8], 16);
+        assert_eq!(show(&mut rig, [-75.0; 8], 100), 100, "less than 50 below the tare, and 115 below the self-test");
+        assert!(show(&mut rig, [-95.0; 8], 32) < 32);
     }
 
     #[test]
