@@ -74,9 +74,8 @@ pub(crate) fn lint(outline: &Outline, facts: &[(String, toml::Value)]) -> Diagno
 fn without_consequences(mut found: Diagnostics) -> Diagnostics {
     let has = |code: Code| found.iter().any(|one| one.code == code);
     let (has_wrong, rolls) = (has(Code::WrongColumn), has(Code::UnforcedRolling));
-    let has_unused = has(Code::UnusedColumn);
     found.retain(|one| match one.code {
-        Code::IdleAxis => !has_wrong && !has_unused,
+        Code::IdleAxis => !has_wrong,
         Code::UnusedColumn => !has_wrong && !rolls,
         _ => true,
     });

@@ -10,7 +10,7 @@ use crate::source::{Code, Diagnostic, Diagnostics, Edit};
 pub(crate) fn check(net: &Net<'_>, opened: &OpenedBench, diagnostics: &mut Diagnostics) -> Option<(Clock, f64)> {
     let task = net.flat.root();
     let has_clock = task.table.as_ref().is_some_and(|table| table.clock.is_some() || table.rate_hz.is_some());
-    if !has_clock && task.has_unknown_setting(diagnostics) {
+    if !has_clock && task.has_wrong_setting(diagnostics) {
         return None;
     }
     let (clock, period) = report(find_clock(net, opened), diagnostics)?;

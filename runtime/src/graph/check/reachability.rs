@@ -39,7 +39,7 @@ fn find_start(net: &Net<'_>, task: usize, diagnostics: &mut Diagnostics) -> Opti
     let mut names = net.flat.mode_names(task);
     let own = &net.flat.tasks[task];
     let Some(word) = own.table.as_ref().and_then(|table| table.start.as_ref()) else {
-        if own.has_unknown_setting(diagnostics) {
+        if own.has_wrong_setting(diagnostics) {
             return None;
         }
         let line = format!("start = \"{}\"", names.next()?);

@@ -135,7 +135,7 @@ impl Loader {
             (None, None) if set.get("devices").is_some() => {
                 return Some(self.sections(|sections| sections.bench(&mut set)));
             }
-            (None, None) if task.has_unknown_setting(&self.diagnostics) => return None,
+            (None, None) if task.has_wrong_setting(&self.diagnostics) => return None,
             (None, None) => {
                 let diagnostic = Diagnostic::new(Code::MissingKey, place.clone(), "the graph has no bench");
                 let help =

@@ -36,10 +36,13 @@ impl Task {
         self.prefix.strip_suffix('.').unwrap_or_default()
     }
 
-    /// Returns whether the section [graph] has an unknown key, which may be meant for a missing one.
-    pub(crate) fn has_unknown_setting(&self, diagnostics: &[Diagnostic]) -> bool {
-        let keys = || self.settings.iter().filter_map(Value::as_table).flat_map(|table| &table.entries);
-        let is_key = |found: &Diagnostic| keys().any(|(key, _)| key.span == found.span);
-        diagnostics.iter().any(|found| found.code == Code::UnknownKey && is_key(found))
+    /// Returns whether a setting of the section [graph] is unknown or wrong: a missing one may be the one that was meant, or
+    /// be lost with it.
+    pub(crate) fn has_wrong_setting(&self, diagnostics: &[Diagnostic]) -> bool {
+        let entries = || self.settings.iter().filter_map(Value::as_table).flat_map(|table| &table.entries);
+        let is_unknown =
+            |found: &Diagnostic| found.code == Code::UnknownKey && entries().any(|(key, _)| key.span == found.span);
+        let is_in_value = |found: &Diagnostic| entries().any(|(_, value)| value.span.contains(&found.span.start));
+        diagnostics.iter().any(|found| is_unknown(found) || self.table.is_none() && is_in_value(found))
     }
 }
