@@ -37,7 +37,7 @@ const GIVE_M: f64 = 0.005;
 const HELD_S: f64 = 1.1;
 const SEEN_S: f64 = 0.1;
 /// How long an arm rests after a loss at least, and how fast it then searches at most [s, m/s].
-const WAIT_S: f64 = 0.55;
+const WAIT_S: f64 = 0.5;
 const SEARCH_M_PER_S: f64 = 0.0052;
 /// A motion that is none [m/s].
 const STILL_M_PER_S: f64 = 1e-4;
