@@ -342,8 +342,7 @@ fn a_bad_parameter_is_a_mistake() {
 #[test]
 fn an_equilibrium_at_its_limit_does_not_stop_the_arm() {
     let chain = lwr();
-    let equilibrium_of = chain.joints().iter().map(|joint| joint.clone());
-    let joints = JointsShape { joints: equilibrium_of.collect(), unit: Unit::RADIAN };
+    let joints = JointsShape { joints: chain.joints().to_vec(), unit: Unit::RADIAN };
     let wires = wires().into_iter().chain([("equilibrium", joints.into())]).collect::<Vec<_>>();
     let mut rig = NodeRig::new::<IkSink>("", &wires).unwrap();
     let columns = set_arm(&mut rig, &chain, &BENT);
