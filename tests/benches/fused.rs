@@ -84,6 +84,9 @@ pub(crate) struct Fused {
     now: i64,
     contact_at: Option<i64>,
     limited: joint_limit::Limiter,
+    following: joint_limit::Following,
+    /// Whether a joint does not follow its commands. Read off by the bench.
+    pub(crate) is_stuck: bool,
     /// Read off by the bench, so that nothing is optimised away.
     pub(crate) sum: f64,
     pub(crate) peak: f64,
@@ -147,6 +150,8 @@ impl Fused {
             now: 0,
             contact_at: None,
             limited: joint_limit::Limiter::new(7),
+            following: joint_limit::Following::new(7),
+            is_stuck: false,
             sum: 0.0,
             peak: 0.0,
             shape,
@@ -198,6 +203,7 @@ impl Fused {
         let mut velocity = [0.0; 7];
         let moves = self.limit(wanted, &pose, &tick).map(|twist| self.solve(&twist, &pose, arm, &mut velocity));
         let wanted = moves.map(|()| &velocity[..]);
+        self.is_stuck = self.following.note(&tick, self.limited.velocities(), arm[1]);
         self.limited.limit(&self.joints, 0.6, &tick, wanted, arm[0], arm[1]);
         out.copy_from_slice(self.limited.velocities());
         (contact.is_some(), has_axis)

@@ -3,6 +3,7 @@
 
 use std::io::{BufRead, BufReader, Write};
 use std::net::{TcpListener, TcpStream};
+use std::sync::{Arc, Mutex};
 use std::thread;
 use std::time::{Duration, Instant};
 
@@ -61,16 +62,22 @@ impl Peer {
         stream.set_nodelay(true).unwrap();
         writeln!(stream, "{}", self.hello()).unwrap();
         let answers = BufReader::new(stream.try_clone().unwrap());
+        let commanded = Arc::new(Mutex::new([0.0; 7]));
+        let command = Arc::clone(&commanded);
         let answers = thread::spawn(move || {
             let mut seen = Vec::new();
             for line in answers.lines().map_while(Result::ok) {
                 let message: Value = serde_json::from_str(&line).unwrap();
                 seen.extend(message["seq"].as_u64().map(|seq| (seq as u32, Instant::now())));
+                let velocities = message["dq"].as_array().into_iter().flatten().filter_map(Value::as_f64);
+                command.lock().unwrap().iter_mut().zip(velocities).for_each(|(command, velocity)| *command = velocity);
             }
             seen
         });
         let begin = Instant::now() + Duration::from_millis(100);
         let mut frames = Vec::new();
+        // The arm is held, and its springs yield as they are commanded.
+        let mut equilibrium = START;
         for i in (1..=self.frames).filter(|i| i % 250 >= self.silent) {
             let measured = begin + self.period * i;
             // A number from 0 to 1, the same in each run.
@@ -81,8 +88,10 @@ impl Peer {
             let t = 500.0 + self.period.as_secs_f64() * f64::from(i) * (1.0 + self.drift);
             let mut q = START;
             q[0] += MARK * f64::from(i);
-            let frame =
-                json!({"type": "obs", "seq": i, "t": t, "q": q, "dq": vec![0.0; 7], "q_eq": q, "img": vec![0; 16]});
+            for (joint, command) in equilibrium.iter_mut().zip(*commanded.lock().unwrap()) {
+                *joint += command * self.period.as_secs_f64();
+            }
+            let frame = json!({"type": "obs", "seq": i, "t": t, "q": q, "dq": vec![0.0; 7], "q_eq": equilibrium, "img": vec![0; 16]});
             let sent = Instant::now();
             if writeln!(stream, "{frame}").is_err() {
                 break;
@@ -173,7 +182,7 @@ fn ages_are_true_and_frames_are_answered_at_once_whatever_the_clock_of_the_simul
     let runs: Vec<_> = peers.map(|peer| (peer, thread::spawn(move || run(peer)))).into_iter().collect();
     for (peer, run) in runs {
         let seen = run.join().unwrap();
-        assert!(seen.errors.len() > 50, "{peer:?}: {} frames", seen.errors.len());
+        assert!(seen.errors.len() > 50, "{peer:?}: {} frames, halts {:?}", seen.errors.len(), seen.halts);
         let [error, answer] =
             [&seen.errors, &seen.answers].map(|values| [0.5, 0.99].map(|share| quantile(values, share)));
         // Half of them, since a busy machine delays both sides.

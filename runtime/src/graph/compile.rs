@@ -14,7 +14,7 @@ use crate::graph::load::{FlatGraph, Loader, Request};
 use crate::graph::net::{Net, slow_down};
 use crate::graph::outline::OutlineBuilder;
 use crate::graph::plan::{AllowedWarning, Plan, PlannedCommand, PlannedMode, PlannedNode, PortRef};
-use crate::source::{Code, Diagnostics, Report, Severity, SourceMap};
+use crate::source::{Code, Diagnostic, Diagnostics, Report, Severity, SourceMap};
 
 /// Checks and builds a graph.
 ///
@@ -54,12 +54,14 @@ pub(crate) fn compile_in(mut loader: Loader, catalogue: &Catalogue, request: &Re
     check::quantities::check(&net, &mut diagnostics);
     check::facts::check(&net, &sources, &mut diagnostics);
     check::limits::check(&net, &mut frames, &mut diagnostics);
-    check::limit_values::check(&net, &opened, &sources, &mut diagnostics);
+    let misspelt = check::limit_values::check(&net, &opened, &sources, &mut diagnostics);
     check::limit_sections::check(&net, &mut diagnostics);
     let clock = check::clock::check(&net, &opened, &mut diagnostics);
     let period = clock.map_or(1.0, |(_, period)| period);
     let mut builder = Builder::new(&net, &opened, frames, (diagnostics, sources), period);
     let mut nodes: Vec<PlannedNode> = net.order.iter().filter_map(|node| builder.node(*node)).collect();
+    let is_told = |found: &Diagnostic| found.code == Code::MissingLimit && misspelt.contains(&found.span);
+    builder.diagnostics.retain(|found| !is_told(found));
     builder.check_delayed_units();
     check::calibration::check(&net, &nodes, &mut builder.diagnostics);
     view.check_units(&builder.ports, &mut builder.diagnostics);

@@ -198,7 +198,7 @@ fn restore(copy: &Copy, fresh: &Copy) {
 /// One changed token gives one message, on its line, that suggests the token that was there.
 #[test]
 fn the_first_message_is_about_the_changed_token() {
-    let (seed, count) = (number("TACTFLOW_SEED", 11), number("TACTFLOW_MUTANTS", 400) as usize);
+    let (seed, count) = (number("TACTFLOW_SEED", 11), number("TACTFLOW_MUTANTS", 1600) as usize);
     let scores = scores(seed, count, &Operation::ALL, std::env::var_os("TACTFLOW_SEED").is_some());
     let total = sum(&scores);
     let text = format!("{total:?}, of {scores:#?}");

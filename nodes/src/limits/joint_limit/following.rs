@@ -23,9 +23,9 @@ const DELAY_S: f64 = 0.1;
 /// How late a command may act in a slow graph, in its longest ticks [1].
 const DELAY_TICKS: f64 = 4.0;
 
-/// The accounts of all joints.
+/// What all joints were commanded, and how far they went.
 #[derive(State)]
-pub(super) struct Following {
+pub struct Following {
     joints: Vec<Account>,
     /// When the current block of the histories began [ns].
     block: Option<i64>,
@@ -45,18 +45,20 @@ struct Account {
 }
 
 impl Following {
-    pub(super) fn new(count: usize) -> Self {
+    /// Starts to watch that many joints.
+    #[must_use]
+    pub fn new(count: usize) -> Self {
         Self { joints: vec![Account::default(); count], block: None, stuck: None }
     }
 
     /// Closes all accounts: the device does not get these commands now.
-    pub(super) fn pause(&mut self) {
+    pub fn pause(&mut self) {
         self.joints.fill(Account::default());
         self.block = None;
     }
 
     /// Notes the commands of the last tick [rad/s] and where they have led. Returns whether a joint does not follow.
-    pub(super) fn note(&mut self, tick: &Tick, commands: &[f64], equilibrium: &[f64]) -> bool {
+    pub fn note(&mut self, tick: &Tick, commands: &[f64], equilibrium: &[f64]) -> bool {
         let length = DELAY_S.max(DELAY_TICKS * tick.max_gap);
         let begins = (tick.now - *self.block.get_or_insert(tick.now)) as f64 * 1e-9 >= length;
         if begins {
@@ -73,7 +75,8 @@ impl Following {
     }
 
     /// The joint that does not follow, its certain way and its way [rad].
-    pub(super) const fn stuck(&self) -> Option<(usize, [f64; 2])> {
+    #[must_use]
+    pub const fn stuck(&self) -> Option<(usize, [f64; 2])> {
         self.stuck
     }
 }

@@ -10,7 +10,7 @@ use tactflow_runtime::signal::{Flag, Joint, Joints, JointsShape, Scalar, Stamp, 
 use super::{fraction, max_age};
 use crate::usual::{USUAL_LEAD_RAD, USUAL_RAD_PER_S2};
 
-use following::Following;
+pub use following::Following;
 use joints::joints;
 pub use limiter::Limiter;
 

@@ -159,7 +159,9 @@ impl<'a> Opener<'a> {
                 let diagnostic = Diagnostic::new(Code::ObservedRole, role.span.clone(), message);
                 self.diagnostics.push(diagnostic.help(format!("did you mean `{name}`?")));
             }
-            if !self.blocks.contains_key(binding.device()) {
+            let device = binding.device();
+            // A device that is missing for several roles is reported once.
+            if !self.blocks.contains_key(device) && self.tried.insert(device.to_owned(), None).is_none() {
                 self.diagnostics.push(unknown_device(&binding.device_word(), bench));
             }
         }

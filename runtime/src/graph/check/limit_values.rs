@@ -7,6 +7,7 @@ use crate::graph::bench::OpenedBench;
 use crate::graph::load::Entity;
 use crate::graph::net::Net;
 use crate::graph::net::limits::twin;
+use crate::graph::plan::Producer;
 use crate::graph::syntax::{LIMITS, LimitSection};
 use crate::node::{ParamSpec, Spanned};
 use crate::source::{Code, Diagnostic, Diagnostics, Edit, Key, SourceMap, Value, quoted, suggest_name};
@@ -27,8 +28,13 @@ struct LimitRef<'a> {
 /// Reports values that no node uses, and missing values.
 ///
 /// A misspelt key is both unused and missing; it is reported once, where it is misspelt. While a limiter is missing, an
-/// unused value may belong to it and is not reported.
-pub(crate) fn check(net: &Net<'_>, opened: &OpenedBench, sources: &SourceMap, diagnostics: &mut Diagnostics) {
+/// unused value may belong to it and is not reported. Returns the places of the nodes that read a misspelt one.
+pub(crate) fn check(
+    net: &Net<'_>,
+    opened: &OpenedBench,
+    sources: &SourceMap,
+    diagnostics: &mut Diagnostics,
+) -> Vec<Range<usize>> {
     let mut names = net.flat.scopes.iter().flat_map(|scope| scope.names.values());
     let has_unknown_part = names.any(|(_, entity)| matches!(entity, Entity::Unknown));
     let is_limited =
@@ -41,6 +47,7 @@ pub(crate) fn check(net: &Net<'_>, opened: &OpenedBench, sources: &SourceMap, di
     }
     let mut unused: Vec<&Key> = given.iter().copied().filter(|key| !refs.iter().any(|r| r.key == key.name)).collect();
     let mut missing: Vec<&LimitRef<'_>> = Vec::new();
+    let mut without = Vec::new();
     let is_optional = |limits: &[&LimitRef<'_>]| limits.iter().all(|limit| limit.is_optional);
     let required = wanted.values().filter(|limits| !is_optional(limits)).count();
     let is_single = (required, unused.len()) == (1, 1);
@@ -53,6 +60,7 @@ pub(crate) fn check(net: &Net<'_>, opened: &OpenedBench, sources: &SourceMap, di
         let is_meant = |key: &&Key| is_needed || net.catalogue.limit_readers().find(&key.name).is_none();
         if let Some(key) = similar(name, &unused).filter(is_meant).or(only) {
             unused.retain(|other| other.name != key.name);
+            without.extend(limits.iter().map(|limit| net.place(Producer::Node(limit.node))));
             diagnostics.push(misspelt(key, limits, net, sources));
         } else if let Some(key) = similar(name, &given).filter(|_| is_alone && is_needed) {
             diagnostics.push(misspelt_reference(key, limits));
@@ -73,6 +81,7 @@ pub(crate) fn check(net: &Net<'_>, opened: &OpenedBench, sources: &SourceMap, di
     unused.retain(|key| is_of_task(key) || net.catalogue.limit_readers().find(&key.name).is_none());
     diagnostics.extend(unused.into_iter().filter(|_| is_limited).filter_map(|key| unread(key, net)));
     diagnostics.extend(report_missing(net, &missing));
+    without
 }
 
 /// Returns the references in the order of the nodes.
