@@ -9,9 +9,9 @@ use crate::cli::in_new_folder;
 use crate::tool::say;
 
 /// The rows of a recording, each by the names of its columns; absent values are left out.
-fn recorded(graph: &str, for_s: &str) -> Vec<BTreeMap<String, f64>> {
+pub(crate) fn recorded(args: &[&str], for_s: &str) -> Vec<BTreeMap<String, f64>> {
     let (_folder, path) = in_new_folder("run.csv");
-    let run = say(&["run", graph, "--quiet", "--for", for_s, "--out", &path]);
+    let run = say(&[&["run"], args, &["--quiet", "--for", for_s, "--out", &path]].concat());
     assert_eq!(run.code, 0, "{}", run.err);
     let text = fs::read_to_string(path).unwrap();
     let mut lines = text.lines().filter(|line| !line.starts_with('#'));
@@ -23,7 +23,7 @@ fn recorded(graph: &str, for_s: &str) -> Vec<BTreeMap<String, f64>> {
     lines.map(row).collect()
 }
 
-fn explained(args: &[&str]) -> Value {
+pub(crate) fn explained(args: &[&str]) -> Value {
     let said = say(&[&["explain"], args, &["--format", "json"]].concat());
     assert_eq!(said.code, 0, "{}", said.err);
     serde_json::from_str(&said.out).unwrap()
@@ -34,7 +34,7 @@ fn explained(args: &[&str]) -> Value {
 fn assert_is_the_law_of_a_run(graph: &str, sum: &str, for_s: &str) {
     let explained = explained(&[graph]);
     let modes = explained["motions"][0]["modes"].as_array().unwrap();
-    let (mut compared, rows) = (0, recorded(graph, for_s));
+    let (mut compared, rows) = (0, recorded(&[graph], for_s));
     // A tick in which the mode changes writes the twist of the one before.
     for row in rows.windows(2).filter(|pair| pair[0]["mode"] == pair[1]["mode"]).map(|pair| &pair[1]) {
         let mode = &modes[row["mode"] as usize];

@@ -30,6 +30,7 @@ mod erased;
 mod errors;
 mod examples;
 mod explain;
+mod explained_motion;
 mod fault_matrix;
 mod faults;
 mod features;

@@ -2,6 +2,7 @@
 
 mod page;
 mod stability;
+mod touch;
 
 use std::path::PathBuf;
 
@@ -11,9 +12,11 @@ use tactflow_runtime::cli::{GraphArgs, Shell};
 use tactflow_runtime::graph::{Compiled, compile};
 
 use super::control::chain::{Limiter, chain};
+use super::control::contacts::contacts;
 use super::control::law::{Law, law};
 use super::control::settings::{self, Ends, Index, Nodes};
 use stability::{Stability, stability};
+use touch::{Approach, approaches};
 
 /// Print what moves the arm in each mode: gains, limits and delays
 #[derive(clap::Parser)]
@@ -79,6 +82,8 @@ struct ModeLaw {
     law: Law,
     /// The loops of the features that are controlled, over each contact that the bench declares.
     loops: Vec<Stability>,
+    /// The motions that meet an object.
+    approaches: Vec<Approach>,
     /// How the mode ends.
     ends: Ends,
 }
@@ -111,12 +116,14 @@ fn explain(compiled: &Compiled, port: Option<&str>) -> Result<Explained, String>
 
 fn motion(compiled: &Compiled, index: &Index<'_>, of: String, port: &str) -> Result<Motion, String> {
     let (limits, twist) = chain(&Nodes::new(index, None), port)?;
+    let declared = contacts(compiled.facts(), of.split('.').next().unwrap_or_default())?;
     let modes = index.modes(index.task_of(port)).into_iter().map(|mode| {
         let nodes = Nodes::new(index, mode);
         let law = law(&nodes, &twist);
         Ok(ModeLaw {
             mode: mode.map(|mode| mode.name.clone()),
-            loops: stability(compiled.facts(), &of, &law, nodes.period())?,
+            loops: stability(&declared, &law, nodes.period()),
+            approaches: approaches(&nodes, &limits, &law, &declared),
             law,
             ends: mode.map(settings::ends).unwrap_or_default(),
         })

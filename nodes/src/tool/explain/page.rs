@@ -6,6 +6,7 @@ use std::path::Path;
 use tactflow_runtime::cli::table;
 
 use super::stability::Stability;
+use super::touch::Approach;
 use super::{Explained, ModeLaw, Motion};
 use crate::tool::control::law::{COMPONENTS, Feature};
 
@@ -52,6 +53,7 @@ fn page(graph: &Path, explained: &Explained, style: &Style) -> String {
             let name = mode.mode.as_ref().map(|mode| format!(" in the mode `{mode}`")).unwrap_or_default();
             let _ = write!(text, "\n{section}`{}`{name}\n\n", motion.of);
             text += &law(mode, style);
+            text += &mode.approaches.iter().map(approach).collect::<String>();
             text += &loops(&mode.loops, style);
         }
         text += &limits(motion, section);
@@ -89,6 +91,24 @@ fn law(mode: &ModeLaw, style: &Style) -> String {
     }
     for (key, value) in &mode.ends {
         let _ = writeln!(text, "Ends: `{key} = {value}`.");
+    }
+    text
+}
+
+fn approach(approach: &Approach) -> String {
+    let Approach { node, speed_m_per_s, reaction_s, deceleration_m_per_s2, way_m, hits } = approach;
+    let [speed, way, reaction] = [speed_m_per_s, way_m, reaction_s].map(|value| number((1e6 * value).round() * 1e-3));
+    let deceleration = number(*deceleration_m_per_s2);
+    let mut text = format!(
+        "From the {speed} mm/s of `{node}` the sensor brakes in {way} mm: {reaction} ms until the arm follows, then {deceleration} m/s2.\n"
+    );
+    for hit in hits {
+        let [stiffness, resonance] = [hit.contact_n_per_m, hit.resonance_hz].map(number);
+        let _ = writeln!(
+            text,
+            "  Its hit on `{}` adds {:.1} N at most, by {stiffness} N/m and a resonance of {resonance} Hz.",
+            hit.object, hit.force_n
+        );
     }
     text
 }

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use serde::Serialize;
 
-use crate::tool::control::contacts::{Contact, contacts};
+use crate::tool::control::contacts::Contact;
 use crate::tool::control::law::{Feature, Law};
 use crate::tool::control::margins::{Margins, margins};
 use crate::tool::control::response::Loop;
@@ -19,18 +19,10 @@ pub(super) struct Stability {
     pub(super) margins: Option<Margins>,
 }
 
-/// Returns the margins of all features that a law controls, with the contacts that the bench declares for the arm of a
-/// command.
-pub(super) fn stability(
-    facts: &[(String, toml::Value)],
-    command: &str,
-    law: &Law,
-    period: f64,
-) -> Result<Vec<Stability>, String> {
-    let arm = command.split('.').next().unwrap_or_default();
-    let declared = contacts(facts, arm)?;
+/// Returns the margins of all features that a law controls, with the contacts that the bench declares for the arm.
+pub(super) fn stability(declared: &[Contact], law: &Law, period: f64) -> Vec<Stability> {
     let alone = [Contact { object: String::new(), latency_ms: 0.0, features: BTreeMap::new() }];
-    let declared = if declared.is_empty() { &alone[..] } else { &declared[..] };
+    let declared = if declared.is_empty() { &alone[..] } else { declared };
     let controlled: Vec<&Feature> = law.features.iter().filter(|feature| feature.moves()).collect();
     let loops = declared.iter().flat_map(|contact| {
         controlled.iter().map(|feature| Stability {
@@ -39,5 +31,5 @@ pub(super) fn stability(
             margins: Loop::over(feature, contact, period).map(|around| margins(&around)),
         })
     });
-    Ok(loops.collect())
+    loops.collect()
 }
