@@ -328,3 +328,69 @@ fn the_page_shows_a_scenario_that_runs() {
     let shown = page.split("```toml\n").nth(1).and_then(|rest| rest.split("```").next()).unwrap();
     assert_eq!(shown, fs::read_to_string(workspace().join(SLIDE)).unwrap());
 }
+
+/// Three runs on a bench whose friction and whose object vary.
+fn varied(vary: &str, bound: f64) -> String {
+    let graphs = workspace().join("graphs").display().to_string();
+    format!(
+        "[scenario]\ngraph = '{graphs}/force.toml'\nbench = '{graphs}/benches/ball.toml'\nseeds = 3\nfor_s = 3.0\n\
+         from = 'touch.present'\nvary = {vary}\n[check.force]\nof = 'truth.force'\nnever_above = {bound}\n"
+    )
+}
+
+#[test]
+fn parameters_vary_between_runs_and_the_worst_run_is_named_and_comes_again() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("varied.toml");
+    let path = path.to_str().unwrap();
+    let [object, friction] = ["devices.bench.objects.0.stiffness", "devices.bench.friction"];
+    fs::write(path, varied(&format!("{{ {object} = [60.0, 1200.0], {friction} = [0.1, 1.0] }}"), 1.0)).unwrap();
+    let said = say(&["verify", path, "--json"]);
+    let found: serde_json::Value = serde_json::from_str(&said.out).unwrap();
+    let scenario = &found["scenarios"][0];
+    let values = scenario["rows"][0]["values"].as_array().unwrap();
+    let stiffness = |run: usize| scenario["runs"][run]["varied"][object].as_f64().unwrap();
+    assert!((0..3).all(|run| (60.0..=1200.0).contains(&stiffness(run))) && stiffness(0) != stiffness(1));
+    let worst = (0..3).max_by(|a, b| values[*a].as_f64().unwrap().total_cmp(&values[*b].as_f64().unwrap())).unwrap();
+    let page = say(&["verify", path]);
+    assert_eq!(page.code, 1);
+    let named = format!("max of force is worst with seed {}: {friction} = ", worst + 1);
+    assert!(page.out.contains(&named) && page.out.contains(&format!("{object} = 60 to 1200")), "{}", page.out);
+    // The same run by hand.
+    let set = |name: &str| format!("{name}={:?}", scenario["runs"][worst]["varied"][name].as_f64().unwrap());
+    let out = folder.path().join("run.csv").display().to_string();
+    let args = ["run", "graphs/force.toml", "--quiet", "--for", "3s", "--out", &out];
+    let seed = format!("devices.bench.seed={}", worst + 1);
+    let sets = [set(object), set(friction), seed];
+    let run = say(&args.into_iter().chain(sets.iter().flat_map(|set| ["--set", set])).collect::<Vec<_>>());
+    assert_eq!(run.code, 0, "{}", run.err);
+    let text = fs::read_to_string(&out).unwrap();
+    let mut lines = text.lines().filter(|line| !line.starts_with('#'));
+    let column = lines.next().unwrap().split(',').position(|name| name == "truth.force").unwrap();
+    let force = lines.filter_map(|line| line.split(',').nth(column)?.parse::<f64>().ok()).fold(0.0, f64::max);
+    assert!((force - values[worst].as_f64().unwrap()).abs() < 1e-9, "{force}");
+}
+
+#[test]
+fn what_cannot_vary_is_named_at_its_values() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("varied.toml");
+    let friction = "{ devices.bench.friction = [0.1, 1.0] }";
+    for (text, why) in [
+        (varied("{ devices.bench.friction = [1.0] }", 9.0), "each with its smallest and its largest value"),
+        (varied("{ devices.bench.friction = [1.0, 0.1] }", 9.0), "each with its smallest and its largest value"),
+        (varied("{ devices.bench.frction = [0.1, 1.0] }", 9.0), "`frction` is not a parameter here"),
+        (varied("{ devices.bench.friction = [-0.1, 1.0] }", 9.0), "expected a number, 0 or more [N m], found -0.1"),
+        (varied("{ nodes.pid.gains.pressure.kp = [0.1, 1.0] }", 9.0), "is no parameter of a device"),
+        (
+            varied("{ devices.bench.objects.1.stiffness = [60.0, 90.0] }", 9.0),
+            "`devices.bench.objects.1.stiffness = 60`",
+        ),
+        (varied(friction, 9.0).replace("seeds = 3\n", ""), "has no `seeds`, so nothing can vary"),
+    ] {
+        fs::write(&path, &text).unwrap();
+        let said = say(&["verify", path.to_str().unwrap()]);
+        assert_eq!(said.code, 2, "{text}");
+        assert!(said.err.contains(why) && said.err.contains("varied.toml:"), "{text}{}", said.err);
+    }
+}

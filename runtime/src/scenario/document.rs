@@ -4,6 +4,7 @@ use std::ops::Range;
 
 use super::check_table::{CheckBlock, CheckTable};
 use super::inject::{InjectBlock, blocks};
+use super::vary::Vary;
 use crate::node::{At, FilePath, Mistake, Param, Reader, Spanned};
 use crate::source::{Code, Item, Key, SourceMap, Table, Value, suggestion};
 
@@ -17,6 +18,8 @@ pub(crate) struct ScenarioTable {
     /// Number of seeds, from 1 on, or a list of seeds. Each run sets its seed as the `seed` of every device that has
     /// one.
     pub(crate) seeds: Option<Seeds>,
+    /// Parameters of devices that differ between the runs, each with its smallest and its largest value.
+    pub(crate) vary: Option<Vary>,
     /// Duration of a run.
     #[param(unit = "s", above = 0.0)]
     pub(crate) for_s: f64,

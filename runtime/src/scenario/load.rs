@@ -46,7 +46,11 @@ impl Scenario {
             return Err(Report::new(loader.sources, found));
         };
         match compile_in(loader, catalogue, &request) {
-            Ok(mut plan) => look_up(&document, request, &mut plan, catalogue, found),
+            Ok(mut plan) => {
+                let vary = document.scenario.as_ref().and_then(|table| table.vary.as_ref());
+                found.extend(vary.into_iter().flat_map(|vary| vary.mistakes(catalogue, &request)));
+                look_up(&document, request, &mut plan, catalogue, found)
+            }
             Err(report) => {
                 found.extend(report.diagnostics);
                 Err(Report::new(report.sources, found))

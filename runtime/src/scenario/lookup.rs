@@ -48,8 +48,9 @@ pub(super) fn look_up(
             seeds: table.seeds.as_ref().map(|seeds| seeds.list.clone()).unwrap_or_default(),
             facts: table.facts.iter().filter_map(|word| lookup.fact(word)).collect(),
             request,
-            seed_keys: lookup.seeds(table, catalogue, !injections.is_empty()),
+            seed_keys: lookup.seeds(table, catalogue, !injections.is_empty() || table.vary.is_some()),
             injections,
+            vary: table.vary.clone().unwrap_or_default(),
             from,
             never_lost,
             stays_in: table.stays_in.as_ref().and_then(|word| lookup.mode(&word.value)),
@@ -268,18 +269,25 @@ impl Lookup<'_> {
         })
     }
 
-    /// Returns the keys that set the seed. Without such a key and without faults, every seed would give the same run.
-    fn seeds(&mut self, table: &ScenarioTable, catalogue: &Catalogue, has_faults: bool) -> Vec<String> {
+    /// Returns the keys that set the seed. Without such a key, and if nothing else `differs`, every seed would give the
+    /// same run.
+    fn seeds(&mut self, table: &ScenarioTable, catalogue: &Catalogue, differs: bool) -> Vec<String> {
         let has_seed = |kind: &str| {
             let known = catalogue.find_device(kind);
             known.is_some_and(|device| device.params().iter().any(|param| param.name == "seed"))
         };
         let devices = self.plan.outline().devices.iter().filter(|device| has_seed(&device.kind.text));
         let keys: Vec<String> = devices.map(|device| format!("devices.{}.seed", device.name)).collect();
-        if let Some(seeds) = table.seeds.as_ref().filter(|_| keys.is_empty() && !has_faults) {
+        if let Some(seeds) = table.seeds.as_ref().filter(|_| keys.is_empty() && !differs) {
             let message = "no device of this bench has a `seed`, so every run would be the same";
             let diagnostic = Diagnostic::new(Code::UnknownKey, seeds.span.clone(), message);
             self.found.push(diagnostic.help("remove `seeds` to run the scenario once"));
+        }
+        if let (Some(vary), None) = (&table.vary, &table.seeds) {
+            let message = "the scenario has no `seeds`, so nothing can vary";
+            let place = vary.0.first().map_or(0..0, |varied| varied.span.clone());
+            let diagnostic = Diagnostic::new(Code::MissingKey, place, message);
+            self.found.push(diagnostic.help("write, for example, `seeds = 20` in [scenario]"));
         }
         keys
     }

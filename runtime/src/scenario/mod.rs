@@ -3,7 +3,7 @@
 //! `document` and `check_table` read the file, `load` checks it, and `lookup` resolves the ports and modes that it
 //! names. `inject` spoils images and commands, and disturbs simulated worlds; [`matrix`] tries these faults one by one. `trial` runs it with one seed while `observer` collects the readings in the `window` of each check.
 //! [`measure`] and `figures` compute the figures of a run, and [`judge`] combines the figures of all runs. A scenario
-//! cannot change its task or its bench; it only sets the seed and injects faults.
+//! cannot change its task; it sets the seed, varies parameters of the bench (`vary`) and injects faults.
 
 mod bounds;
 mod check_table;
@@ -19,6 +19,7 @@ pub mod measure;
 mod model;
 mod observer;
 mod trial;
+mod vary;
 mod window;
 
 pub use document::Seeds;

@@ -3,6 +3,7 @@
 use super::figure::{Bound, Figure};
 use super::inject::Injection;
 use super::judge::FigureRow;
+use super::vary::Vary;
 use super::window::{ModeName, Window};
 use crate::graph::Request;
 use crate::source::Report;
@@ -19,6 +20,8 @@ pub struct Scenario {
     pub(super) request: Request,
     /// The faults that every run injects.
     pub(super) injections: Vec<Injection>,
+    /// The parameters that differ between the runs.
+    pub(crate) vary: Vary,
     /// `devices.NAME.seed` of each device that has a seed.
     pub(super) seed_keys: Vec<String>,
     /// The flag that defines time 0: its name in the file, and its column.

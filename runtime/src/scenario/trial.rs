@@ -1,5 +1,6 @@
 //! One run of a scenario, with one seed.
 
+use std::collections::BTreeMap;
 use std::path::Path;
 
 use serde::Serialize;
@@ -8,6 +9,7 @@ use super::inject::inject;
 use super::judge::FigureRow;
 use super::model::Scenario;
 use super::observer::{NotChecked, Observer, seconds};
+use super::vary::assignment;
 use crate::catalogue::Catalogue;
 use crate::engine::{End, Engine, run_virtual};
 use crate::graph::{Request, compile};
@@ -18,6 +20,9 @@ use crate::record::{RecordFormat, Recorder};
 pub struct Trial {
     /// The seed, if the scenario has seeds.
     pub seed: Option<u64>,
+    /// The parameters that vary between the runs, with the values of this one.
+    #[serde(skip_serializing_if = "BTreeMap::is_empty")]
+    pub varied: BTreeMap<String, f64>,
     /// Duration of the run [s].
     #[serde(rename = "time_s")]
     pub time: f64,
@@ -56,7 +61,14 @@ impl Scenario {
     ) -> Option<Trial> {
         let failed = |time: f64, failure: String| {
             let figures = vec![None; self.rows.len()];
-            Some(Trial { seed, time, failure: Some(failure), not_checked: Vec::new(), figures })
+            Some(Trial {
+                seed,
+                varied: self.varied(seed),
+                time,
+                failure: Some(failure),
+                not_checked: Vec::new(),
+                figures,
+            })
         };
         let mut engine = match compile(catalogue, &self.seeded(seed)) {
             Ok(mut compiled) => {
@@ -96,13 +108,27 @@ impl Scenario {
             Some(failure) => failed(time, failure),
             None => {
                 let figures = observer.figures(&engine, outcome.end == End::Done);
-                Some(Trial { seed, time, failure, not_checked: observer.not_checked(), figures })
+                Some(Trial {
+                    seed,
+                    varied: self.varied(seed),
+                    time,
+                    failure,
+                    not_checked: observer.not_checked(),
+                    figures,
+                })
             }
         }
     }
 
     fn seeded(&self, seed: Option<u64>) -> Request {
-        let set = seed.iter().flat_map(|seed| self.seed_keys.iter().map(move |key| format!("{key}={seed}")));
+        let seeds = seed.iter().flat_map(|seed| self.seed_keys.iter().map(move |key| format!("{key}={seed}")));
+        let varied = self.varied(seed);
+        let set = seeds.chain(varied.iter().map(|(path, value)| assignment(path, *value)));
         Request { set: set.collect(), ..self.request.clone() }
+    }
+
+    /// Returns the values of the parameters that vary, in the run with this seed.
+    fn varied(&self, seed: Option<u64>) -> BTreeMap<String, f64> {
+        seed.into_iter().flat_map(|seed| self.vary.drawn(seed)).collect()
     }
 }

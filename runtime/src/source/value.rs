@@ -105,20 +105,45 @@ impl Table {
         Some(FactRef { word, place: &value.span, is_optional })
     }
 
-    /// Merges another table over this one: tables merge recursively, other values replace, nothing is deleted.
+    /// Returns whether each key is the number of an item in a list of this length, counted from 0.
+    fn counts(&self, items: usize) -> bool {
+        self.entries.iter().all(|(key, _)| key.name.parse().is_ok_and(|i: usize| i < items))
+    }
+
+    /// Merges another table over this one: tables merge recursively, other values replace, nothing is deleted. A table
+    /// whose keys count the items of a list, as in `objects.0.stiffness`, merges with these items.
     pub fn merge(&mut self, over: Self) {
         for (key, value) in over.entries {
             match self.entries.iter_mut().find(|(mine, _)| mine.name == key.name) {
                 None => self.entries.push((key, value)),
-                Some((mine, old)) => match (&mut old.item, value.item) {
-                    (Item::Table(old), Item::Table(new)) if old.fact().or(new.fact()).is_none() => old.merge(new),
-                    (item, new) => {
-                        *item = new;
-                        (old.span, mine.span) = (value.span, key.span);
+                Some((mine, old)) => {
+                    if let Err(new) = old.merge(value) {
+                        (*old, mine.span) = (new, key.span);
                     }
-                },
+                }
             }
         }
+    }
+}
+
+impl Value {
+    /// Merges a table into a table or into the items of a list, or returns a value that replaces this one.
+    fn merge(&mut self, over: Self) -> Result<(), Self> {
+        match (&mut self.item, over.item) {
+            (Item::Table(old), Item::Table(new)) if old.fact().or(new.fact()).is_none() => old.merge(new),
+            (Item::Array(items), Item::Table(new)) if new.counts(items.len()) => {
+                for (key, value) in new.entries {
+                    let item = key.name.parse().ok().and_then(|i: usize| items.get_mut(i));
+                    if let Some(item) = item
+                        && let Err(new) = item.merge(value)
+                    {
+                        *item = new;
+                    }
+                }
+            }
+            (_, item) => return Err(Self { item, ..over }),
+        }
+        Ok(())
     }
 }
 

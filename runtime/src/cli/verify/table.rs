@@ -34,6 +34,7 @@ pub(crate) fn text(all: &[Verified], has_colour: bool) -> String {
     for verified in all {
         if let Ok(scenario) = &verified.loaded {
             text.push_str(&format!("{}: {}\n", verified.name(), describe(scenario)));
+            text.extend(verified.rows.iter().filter_map(|row| worst_of(row, &verified.trials)));
         }
     }
     text.push_str(&format!("\n{}\n", summary(all)));
@@ -62,7 +63,17 @@ fn describe(scenario: &Scenario) -> String {
         count => format!("{count} seeds"),
     };
     let facts = scenario.facts.iter().map(|(name, value)| format!(", {name} = {value}"));
-    format!("{runs} of {} s{}", scenario.for_s, facts.collect::<String>())
+    let varied = scenario.vary.ranges().map(|(path, [low, high])| format!(", {path} = {low} to {high}"));
+    format!("{runs} of {} s{}", scenario.for_s, facts.chain(varied).collect::<String>())
+}
+
+/// Names the run in which a figure that failed is worst, with the parameters that vary.
+fn worst_of(row: &FigureRow, trials: &[Trial]) -> Option<String> {
+    let worst = row.worst();
+    let trial = trials.iter().zip(&row.values).find(|(_, value)| **value == worst).map(|(trial, _)| trial)?;
+    let seed = trial.seed.filter(|_| row.verdict() == Verdict::Failed && !trial.varied.is_empty())?;
+    let varied: Vec<String> = trial.varied.iter().map(|(path, value)| format!("{path} = {}", number(*value))).collect();
+    Some(format!("  {} of {} is worst with seed {seed}: {}\n", row.figure.name(), row.check, varied.join(", ")))
 }
 
 /// Returns a row that says why there are no figures.

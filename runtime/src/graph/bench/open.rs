@@ -160,8 +160,7 @@ impl<'a> Opener<'a> {
                 self.diagnostics.push(diagnostic.help(format!("did you mean `{name}`?")));
             }
             let device = binding.device();
-            // A device that is missing for several roles is reported once.
-            if !self.blocks.contains_key(device) && self.tried.insert(device.to_owned(), None).is_none() {
+            if !self.blocks.contains_key(device) && self.tried.insert(device.into(), None).is_none() {
                 self.diagnostics.push(unknown_device(&binding.device_word(), bench));
             }
         }
