@@ -14,7 +14,7 @@ use crate::graph::load::{FlatGraph, Loader, Request};
 use crate::graph::net::{Net, slow_down};
 use crate::graph::outline::OutlineBuilder;
 use crate::graph::plan::{AllowedWarning, Plan, PlannedCommand, PlannedMode, PlannedNode, PortRef};
-use crate::source::{Code, Diagnostic, Diagnostics, Report, Severity, SourceMap};
+use crate::source::{Code, Diagnostics, Report, Severity, SourceMap};
 
 /// Checks and builds a graph.
 ///
@@ -60,8 +60,7 @@ pub(crate) fn compile_in(mut loader: Loader, catalogue: &Catalogue, request: &Re
     let period = clock.map_or(1.0, |(_, period)| period);
     let mut builder = Builder::new(&net, &opened, frames, (diagnostics, sources), period);
     let mut nodes: Vec<PlannedNode> = net.order.iter().filter_map(|node| builder.node(*node)).collect();
-    let is_told = |found: &Diagnostic| found.code == Code::MissingLimit && misspelt.contains(&found.span);
-    builder.diagnostics.retain(|found| !is_told(found));
+    check::limit_values::tell_once(&misspelt, &mut builder.diagnostics);
     builder.check_delayed_units();
     check::calibration::check(&net, &nodes, &mut builder.diagnostics);
     view.check_units(&builder.ports, &mut builder.diagnostics);
@@ -75,9 +74,7 @@ pub(crate) fn compile_in(mut loader: Loader, catalogue: &Catalogue, request: &Re
     let (diagnostics, sources, of_nodes) = builder.finish();
     measured.extend(of_nodes);
     let (mistakes, mut warnings) = split(check::parts::move_out(&flat, &sources, diagnostics));
-    let Some((clock, _)) = clock.filter(|_| mistakes.is_empty()) else {
-        return Err(Report::new(sources, mistakes));
-    };
+    let Some((clock, _)) = clock.filter(|_| mistakes.is_empty()) else { return Err(Report::new(sources, mistakes)) };
     assert_eq!(nodes.len(), flat.nodes.len(), "a graph without a mistake has all its nodes");
     log_plan(&nodes, &opened, &sources);
     let gaps = max_gaps(&net, &opened, period);

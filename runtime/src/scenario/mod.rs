@@ -26,3 +26,4 @@ pub use document::Seeds;
 pub use model::Scenario;
 pub use observer::NotChecked;
 pub use trial::Trial;
+pub use vary::Vary;

@@ -21,7 +21,7 @@ pub struct Scenario {
     /// The faults that every run injects.
     pub(super) injections: Vec<Injection>,
     /// The parameters that differ between the runs.
-    pub(crate) vary: Vary,
+    pub vary: Vary,
     /// `devices.NAME.seed` of each device that has a seed.
     pub(super) seed_keys: Vec<String>,
     /// The flag that defines time 0: its name in the file, and its column.

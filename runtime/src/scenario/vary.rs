@@ -10,7 +10,7 @@ use crate::source::{Code, Diagnostic, Item, Value};
 
 /// The parameters that vary, each between two values.
 #[derive(Debug, Clone, Default)]
-pub(crate) struct Vary(pub(super) Vec<Varied>);
+pub struct Vary(pub(super) Vec<Varied>);
 
 /// A parameter that varies.
 #[derive(Debug, Clone)]
@@ -70,7 +70,7 @@ impl Vary {
     }
 
     /// Returns the parameters with their ranges.
-    pub(crate) fn ranges(&self) -> impl Iterator<Item = (&str, [f64; 2])> {
+    pub fn ranges(&self) -> impl Iterator<Item = (&str, [f64; 2])> {
         self.0.iter().map(|varied| (&*varied.path, [varied.low, varied.high]))
     }
 

@@ -84,6 +84,11 @@ pub(crate) fn check(
     without
 }
 
+/// Removes what the nodes at these places say of a limit that they lack: its misspelt key is reported.
+pub(crate) fn tell_once(misspelt: &[Range<usize>], diagnostics: &mut Diagnostics) {
+    diagnostics.retain(|found| found.code != Code::MissingLimit || !misspelt.contains(&found.span));
+}
+
 /// Returns the references in the order of the nodes.
 fn find_refs<'a>(net: &Net<'a>) -> Vec<LimitRef<'a>> {
     let mut refs = Vec::new();
