@@ -80,13 +80,16 @@ pub(crate) struct Packets {
     frame: Vec<u8>,
     /// Whether the beginning of the next packet is known.
     is_aligned: bool,
+    /// Whether the beginning of the next packet was dropped, because it was too long.
+    is_cut: bool,
     pub(super) counts: Counts,
 }
 
 impl Packets {
     pub(crate) fn new(coding: Coding, rule: Rule) -> Self {
         let frame = Vec::with_capacity(coding.longest(rule.longest()));
-        Self { coding, rule, pending: BytesMut::new(), frame, is_aligned: false, counts: Counts::default() }
+        let (pending, counts) = (BytesMut::new(), Counts::default());
+        Self { coding, rule, pending, frame, is_aligned: false, is_cut: false, counts }
     }
 
     pub(super) fn push(&mut self, bytes: &[u8]) {
@@ -96,17 +99,19 @@ impl Packets {
     pub(super) fn forget(&mut self) {
         self.counts.skipped += self.pending.len() as u64;
         self.pending.clear();
-        self.is_aligned = false;
+        (self.is_aligned, self.is_cut) = (false, false);
     }
 
     pub(super) fn next(&mut self, is_sound: IsSound<'_>) -> Option<&[u8]> {
         let longest = self.coding.longest(self.rule.longest());
         while let Some(packet) = take_until(&mut self.pending, self.coding.end()) {
             let was_aligned = std::mem::replace(&mut self.is_aligned, true);
+            let was_cut = std::mem::take(&mut self.is_cut);
             if packet.is_empty() {
                 continue;
             }
-            let is_decoded = packet.len() <= longest && self.coding.decode(&packet, &mut self.frame);
+            // The rest of a packet can be a packet too, with the values of other tactels.
+            let is_decoded = !was_cut && packet.len() <= longest && self.coding.decode(&packet, &mut self.frame);
             if is_decoded && self.rule.is_whole(&self.frame, is_sound) {
                 return Some(&self.frame);
             }
@@ -119,7 +124,7 @@ impl Packets {
             self.counts.skipped += self.pending.len() as u64;
             self.counts.resyncs += u64::from(self.is_aligned);
             self.pending.clear();
-            self.is_aligned = false;
+            (self.is_aligned, self.is_cut) = (false, true);
         }
         None
     }

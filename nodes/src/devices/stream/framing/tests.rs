@@ -266,6 +266,11 @@ fn packets_end_with_a_byte_that_is_not_in_them() {
     let bytes = [1, 0xC0, 1, 0xDB, 0xDC, 2, 0xC0, 0xC0, 5, 6, 7, 0xC0];
     assert_eq!(frames(&mut slip, &[(&bytes, false)]), [vec![1, 0xC0, 2], vec![5, 6, 7]]);
     assert_eq!(frames(&mut slip, &[(&[1; 10_000], false), (&[0xC0, 5, 6, 7, 0xC0], false)]), [[5, 6, 7]]);
+    // The rest of a packet that was dropped is no packet, even if it reads like one.
+    let long = [&[4, 1, 2, 3, 0x3D][..], &[1; 20]].concat();
+    assert_eq!(frames(&mut cobs, &[(&long, false), (&[4, 5, 6, 7, 0, 4, 1, 2, 3, 0], false)]), [[1, 2, 3]]);
+    let rest = [(&[1; 10_000][..], false), (&[5, 6, 7, 0xC0, 1, 2, 3, 0xC0], false)];
+    assert_eq!(frames(&mut slip, &rest), [[1, 2, 3]]);
 }
 
 #[test]
