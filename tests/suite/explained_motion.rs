@@ -1,4 +1,4 @@
-//! `explain` against what a run measures: the lag behind a ramp, the way to brake and the hit of a touch.
+//! `explain` against what a run measures: the lag behind a ramp, the stopping distance and the impact force of a touch.
 
 use std::fs;
 
@@ -60,28 +60,32 @@ fn approach(args: &[&str], mode: &str, node: &str) -> Value {
 }
 
 #[test]
-fn the_way_to_brake_bounds_that_of_a_run_and_the_hit_bounds_its_force() {
+fn the_stopping_distance_bounds_that_of_a_run_and_the_impact_bounds_its_force() {
     let args = ["graphs/hybrid.toml", "--bench", "graphs/benches/pen.toml"];
     let reach = approach(&args, "approach", "reach");
-    let way = reach["way_m"].as_f64().unwrap();
+    let distance = reach["stopping_distance_m"].as_f64().unwrap();
     // Two periods of 4 ms, 2 ms of latency, and 2 m/s².
-    assert!((way - (0.015 * 0.010 + 0.015 * 0.015 / 4.0)).abs() < 1e-12, "{way}");
-    let hit = reach["hits"][0]["force_n"].as_f64().unwrap();
-    assert!((hit - 0.015 * 10_000.0 / (std::f64::consts::TAU * 6.6)).abs() < 1e-9, "{hit}");
+    assert!((distance - (0.015 * 0.010 + 0.015 * 0.015 / 4.0)).abs() < 1e-12, "{distance}");
+    let impact = reach["impacts"][0]["force_n"].as_f64().unwrap();
+    assert!((impact - 0.015 * 10_000.0 / (std::f64::consts::TAU * 6.6)).abs() < 1e-9, "{impact}");
     let search = approach(&args, "servo", "move.lost");
     assert_eq!(search["speed_m_per_s"], 0.005);
-    // The commanded way from the tick after `stop` until rest.
+    // A motion away from the object, or along it, has no impact.
+    let away = approach(&["graphs/square.toml", args[1], args[2]], "retreat", "reach");
+    let along = approach(&["graphs/cable.toml", args[1], args[2]], "servo", "guide");
+    assert_eq!((&away["impacts"], &along["impacts"]), (&serde_json::json!([]), &serde_json::json!([])));
+    // The commanded distance from the tick after `stop` until rest.
     let stopped = recorded(&[args[0], args[1], args[2], "--send", "0.2s:stop", "--send", "0.3s:resume"], "0.3s");
-    let way_of = |rows: &[std::collections::BTreeMap<String, f64>]| -> f64 {
+    let distance_of = |rows: &[std::collections::BTreeMap<String, f64>]| -> f64 {
         rows.iter().filter_map(|row| row.get("move.acceleration.twist.vz")).map(|speed| speed * 0.004).sum()
     };
     let from = stopped.iter().position(|row| row["time"] > 0.2).unwrap();
-    let ran = way_of(&stopped[from..]);
-    assert!(ran > 0.0 && ran < way, "{ran} m, explained {way} m");
+    let ran = distance_of(&stopped[from..]);
+    assert!(ran > 0.0 && ran < distance, "{ran} m, explained {distance} m");
     // Without a command back, the first 100 ms of a touch press with the moving mass.
     let rows = recorded(&args, "1s");
     let force = |row: &std::collections::BTreeMap<String, f64>| row.get("truth.force").copied().unwrap_or(0.0);
     let touch = rows.iter().position(|row| force(row) > 0.02).unwrap();
     let most = rows[touch..touch + 25].iter().map(force).fold(0.0, f64::max);
-    assert!(most > hit / 5.0 && most < hit, "{most} N, explained {hit} N");
+    assert!(most > impact / 5.0 && most < impact, "{most} N, explained {impact} N");
 }

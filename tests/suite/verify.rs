@@ -354,7 +354,7 @@ fn parameters_vary_between_runs_and_the_worst_run_is_named_and_comes_again() {
     let worst = (0..3).max_by(|a, b| values[*a].as_f64().unwrap().total_cmp(&values[*b].as_f64().unwrap())).unwrap();
     let page = say(&["verify", path]);
     assert_eq!(page.code, 1);
-    let named = format!("max of force is worst with seed {}: {friction} = ", worst + 1);
+    let named = format!("max of force is worst with seed {}: --set {friction}=", worst + 1);
     assert!(page.out.contains(&named) && page.out.contains(&format!("{object} = 60 to 1200")), "{}", page.out);
     // The same run by hand.
     let set = |name: &str| format!("{name}={:?}", scenario["runs"][worst]["varied"][name].as_f64().unwrap());
@@ -377,15 +377,20 @@ fn what_cannot_vary_is_named_at_its_values() {
     let path = folder.path().join("varied.toml");
     let friction = "{ devices.bench.friction = [0.1, 1.0] }";
     for (text, why) in [
-        (varied("{ devices.bench.friction = [1.0] }", 9.0), "each with its smallest and its largest value"),
-        (varied("{ devices.bench.friction = [1.0, 0.1] }", 9.0), "each with its smallest and its largest value"),
+        (varied("{ devices.bench.friction = [1.0] }", 9.0), "expected two numbers, the smaller one first"),
+        (varied("{ devices.bench.friction = [1.0, 0.1] }", 9.0), "expected two numbers, the smaller one first"),
+        (varied("{ devices.bench.friction = [0.1, inf] }", 9.0), "expected two numbers, the smaller one first"),
+        (varied("[0.1, 1.0]", 9.0), "expected parameters of devices, each with its smallest and its largest value"),
         (varied("{ devices.bench.frction = [0.1, 1.0] }", 9.0), "`frction` is not a parameter here"),
+        (varied("{ devices.bnch.friction = [0.1, 1.0] }", 9.0), "did you mean `bench`?"),
         (varied("{ devices.bench.friction = [-0.1, 1.0] }", 9.0), "expected a number, 0 or more [N m], found -0.1"),
+        (varied("{ devices.bench.rows = [8, 16] }", 9.0), "a parameter that takes any number can vary"),
         (varied("{ nodes.pid.gains.pressure.kp = [0.1, 1.0] }", 9.0), "is no parameter of a device"),
         (
             varied("{ devices.bench.objects.1.stiffness = [60.0, 90.0] }", 9.0),
-            "`devices.bench.objects.1.stiffness = 60`",
+            "`devices.bench.objects.1.stiffness=60.0`",
         ),
+        (varied("{ devices.bench.objects.00.stiffness = [60.0, 90.0] }", 9.0), "does not load"),
         (varied(friction, 9.0).replace("seeds = 3\n", ""), "has no `seeds`, so nothing can vary"),
     ] {
         fs::write(&path, &text).unwrap();

@@ -48,7 +48,7 @@ impl Scenario {
         match compile_in(loader, catalogue, &request) {
             Ok(mut plan) => {
                 let vary = document.scenario.as_ref().and_then(|table| table.vary.as_ref());
-                found.extend(vary.into_iter().flat_map(|vary| vary.mistakes(catalogue, &request)));
+                found.extend(vary.into_iter().flat_map(|vary| vary.mistakes(catalogue, &request, plan.outline())));
                 look_up(&document, request, &mut plan, catalogue, found)
             }
             Err(report) => {

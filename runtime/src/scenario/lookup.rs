@@ -38,6 +38,8 @@ pub(super) fn look_up(
     }
     lookup.found.extend(wrong);
     let scenario = document.scenario.as_ref().map(|table| {
+        let vary = table.vary.clone().unwrap_or_default();
+        let varies = |name: &str| vary.ranges().any(|(path, _)| path == name);
         let from = table.from.as_ref().and_then(|word| Some((word.value.clone(), lookup.flag(word)?)));
         let never_lost = table.never_lost.as_ref().and_then(|word| lookup.flag(word));
         lookup.modes(table);
@@ -46,11 +48,11 @@ pub(super) fn look_up(
         Scenario {
             for_s: table.for_s,
             seeds: table.seeds.as_ref().map(|seeds| seeds.list.clone()).unwrap_or_default(),
-            facts: table.facts.iter().filter_map(|word| lookup.fact(word)).collect(),
+            facts: table.facts.iter().filter_map(|word| lookup.fact(word)).filter(|(name, _)| !varies(name)).collect(),
             request,
             seed_keys: lookup.seeds(table, catalogue, !injections.is_empty() || table.vary.is_some()),
             injections,
-            vary: table.vary.clone().unwrap_or_default(),
+            vary: vary.clone(),
             from,
             never_lost,
             stays_in: table.stays_in.as_ref().and_then(|word| lookup.mode(&word.value)),

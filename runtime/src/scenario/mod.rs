@@ -27,3 +27,5 @@ pub use model::Scenario;
 pub use observer::NotChecked;
 pub use trial::Trial;
 pub use vary::Vary;
+#[cfg(feature = "cli")]
+pub(crate) use vary::assignment;

@@ -3,10 +3,10 @@
 use std::ops::Range;
 
 use crate::catalogue::Catalogue;
-use crate::graph::{Request, compile};
+use crate::graph::{Outline, Request, compile};
 use crate::node::{Param, Reader};
 use crate::random::Random;
-use crate::source::{Code, Diagnostic, Item, Value};
+use crate::source::{Code, Diagnostic, Item, Table, Value, suggestion};
 
 /// The parameters that vary, each between two values.
 #[derive(Debug, Clone, Default)]
@@ -30,43 +30,48 @@ impl Param for Vary {
                                    `{ devices.bench.friction = [0.1, 0.5] }`";
 
     fn read(value: &Value, reader: &mut Reader<'_>) -> Option<Self> {
+        let Some(table) = value.as_table().filter(|table| !table.entries.is_empty()) else {
+            return reader.wrong_type(value, Self::EXPECTS);
+        };
         let mut found = Vec::new();
-        let is_read = flatten("", value, &mut found) && !found.is_empty();
-        is_read.then_some(Self(found)).or_else(|| reader.wrong_type(value, Self::EXPECTS))
+        match flatten("", table, &mut found) {
+            Ok(()) => Some(Self(found)),
+            Err(wrong) => reader.wrong_type(wrong, "two numbers, the smaller one first"),
+        }
     }
 }
 
-/// Collects the ranges below a path. Returns false if a value is none.
-fn flatten(path: &str, value: &Value, found: &mut Vec<Varied>) -> bool {
+/// Collects the ranges below a path, or returns the value that is none.
+fn flatten<'v>(path: &str, table: &'v Table, found: &mut Vec<Varied>) -> Result<(), &'v Value> {
+    for (key, value) in &table.entries {
+        let path = if path.is_empty() { key.name.clone() } else { format!("{path}.{}", key.name) };
+        match value.as_table() {
+            Some(table) => flatten(&path, table, found)?,
+            None => {
+                let (low, high) = range(value).ok_or(value)?;
+                found.push(Varied { path, low, high, span: value.span.clone() });
+            }
+        }
+    }
+    Ok(())
+}
+
+fn range(value: &Value) -> Option<(f64, f64)> {
     let number = |item: &Value| match item.item {
         Item::Integer(number) => Some(number as f64),
         Item::Float(number) => Some(number),
         _ => None,
     };
-    match &value.item {
-        Item::Table(table) => table.entries.iter().all(|(key, value)| {
-            let path = if path.is_empty() { key.name.clone() } else { format!("{path}.{}", key.name) };
-            flatten(&path, value, found)
-        }),
-        Item::Array(items) => match items.iter().map(number).collect::<Option<Vec<_>>>().as_deref() {
-            Some(&[low, high]) if low < high && (high - low).is_finite() => {
-                found.push(Varied { path: path.to_owned(), low, high, span: value.span.clone() });
-                true
-            }
-            _ => false,
-        },
-        _ => false,
-    }
+    let Item::Array(items) = &value.item else { return None };
+    let [low, high] = items.as_slice() else { return None };
+    Some((number(low)?, number(high)?)).filter(|(low, high)| low < high && (high - low).is_finite())
 }
 
 impl Vary {
     /// Returns what the run with this seed assigns: each parameter anywhere between its two values.
     pub(super) fn drawn(&self, seed: u64) -> Vec<(String, f64)> {
-        let draw = |(i, varied): (usize, &Varied)| {
-            let value = Random::new(seed, STREAM + i as u64).uniform(varied.low, varied.high);
-            (varied.path.clone(), value)
-        };
-        self.0.iter().enumerate().map(draw).collect()
+        let draw = |varied: &Varied| (varied.path.clone(), varied.drawn(seed));
+        self.0.iter().map(draw).collect()
     }
 
     /// Returns the parameters with their ranges.
@@ -75,30 +80,50 @@ impl Vary {
     }
 
     /// Reports parameters that are none of a device, and values with which the task does not load.
-    pub(super) fn mistakes(&self, catalogue: &Catalogue, request: &Request) -> Vec<Diagnostic> {
-        self.0.iter().filter_map(|varied| varied.mistake(catalogue, request)).collect()
+    pub(super) fn mistakes(&self, catalogue: &Catalogue, request: &Request, outline: &Outline) -> Vec<Diagnostic> {
+        let devices: Vec<&str> = outline.devices.iter().map(|device| &*device.name).collect();
+        self.0.iter().filter_map(|varied| varied.mistake(catalogue, request, &devices)).collect()
     }
 }
 
 impl Varied {
-    fn mistake(&self, catalogue: &Catalogue, request: &Request) -> Option<Diagnostic> {
-        if !self.path.starts_with("devices.") {
-            let message = format!("`{}` is no parameter of a device, and nothing else varies", self.path);
+    /// Returns the value in the run with this seed. It depends on no other parameter.
+    fn drawn(&self, seed: u64) -> f64 {
+        let stream =
+            self.path.bytes().fold(STREAM, |hash, byte| (hash ^ u64::from(byte)).wrapping_mul(0x100_0000_01b3));
+        Random::new(seed, stream).uniform(self.low, self.high)
+    }
+
+    fn mistake(&self, catalogue: &Catalogue, request: &Request, devices: &[&str]) -> Option<Diagnostic> {
+        let wrong = |message: String| Diagnostic::new(Code::BadValue, self.span.clone(), message);
+        let mut words = self.path.split('.');
+        if words.next() != Some("devices") {
             let help = "write, for example, `vary = { devices.bench.friction = [0.1, 0.5] }`";
-            return Some(Diagnostic::new(Code::BadValue, self.span.clone(), message).help(help));
+            return Some(
+                wrong(format!("`{}` is no parameter of a device, and nothing else varies", self.path)).help(help),
+            );
+        }
+        let device = words.next().unwrap_or_default();
+        if !devices.contains(&device) {
+            let message = format!("no role of this task has a device `{device}`, so `{}` changes nothing", self.path);
+            return Some(wrong(message).help(suggestion(device, devices.iter().copied(), "devices")));
         }
         let refused = |value: f64| {
             let report = compile(catalogue, &request.clone().set(assignment(&self.path, value))).err()?;
             let why = report.diagnostics.first().map(|first| first.message.clone()).unwrap_or_default();
-            let message = format!("the task does not load with `{} = {value}`: {why}", self.path);
-            Some(Diagnostic::new(Code::BadValue, self.span.clone(), message))
+            let found = wrong(format!("the task does not load with `{}`: {why}", assignment(&self.path, value)));
+            Some(if why.contains("a whole number") {
+                found.help("a parameter that takes any number can vary")
+            } else {
+                found
+            })
         };
         [self.low, self.high].into_iter().find_map(refused)
     }
 }
 
 /// Returns the assignment of a value, as in `--set`.
-pub(super) fn assignment(path: &str, value: f64) -> String {
+pub(crate) fn assignment(path: &str, value: f64) -> String {
     format!("{path}={value:?}")
 }
 

@@ -107,7 +107,8 @@ impl Table {
 
     /// Returns whether each key is the number of an item in a list of this length, counted from 0.
     fn counts(&self, items: usize) -> bool {
-        self.entries.iter().all(|(key, _)| key.name.parse().is_ok_and(|i: usize| i < items))
+        let is_one = |name: &str| name.parse().is_ok_and(|i: usize| i < items && i.to_string() == name);
+        !self.entries.is_empty() && self.entries.iter().all(|(key, _)| is_one(&key.name))
     }
 
     /// Merges another table over this one: tables merge recursively, other values replace, nothing is deleted. A table

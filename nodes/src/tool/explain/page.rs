@@ -96,18 +96,19 @@ fn law(mode: &ModeLaw, style: &Style) -> String {
 }
 
 fn approach(approach: &Approach) -> String {
-    let Approach { node, speed_m_per_s, reaction_s, deceleration_m_per_s2, way_m, hits } = approach;
-    let [speed, way, reaction] = [speed_m_per_s, way_m, reaction_s].map(|value| number((1e6 * value).round() * 1e-3));
+    let Approach { node, speed_m_per_s, reaction_s, deceleration_m_per_s2, stopping_distance_m, impacts } = approach;
+    let [speed, distance, reaction] =
+        [speed_m_per_s, stopping_distance_m, reaction_s].map(|value| number((1e6 * value).round() * 1e-3));
     let deceleration = number(*deceleration_m_per_s2);
     let mut text = format!(
-        "From the {speed} mm/s of `{node}` the sensor brakes in {way} mm: {reaction} ms until the arm follows, then {deceleration} m/s2.\n"
+        "From the {speed} mm/s of `{node}` a stop takes {distance} mm: {reaction} ms until the arm follows, then {deceleration} m/s2.\n"
     );
-    for hit in hits {
-        let [stiffness, resonance] = [hit.contact_n_per_m, hit.resonance_hz].map(number);
+    for impact in impacts {
+        let [stiffness, resonance] = [impact.contact_n_per_m, impact.resonance_hz].map(number);
         let _ = writeln!(
             text,
-            "  Its hit on `{}` adds {:.1} N at most, by {stiffness} N/m and a resonance of {resonance} Hz.",
-            hit.object, hit.force_n
+            "  The impact on `{}` adds {:.1} N at most, by {stiffness} N/m and a resonance of {resonance} Hz.",
+            impact.object, impact.force_n
         );
     }
     text

@@ -1,4 +1,4 @@
-//! The way to brake, and the hit of a touch.
+//! The stopping distance of each motion, and the impact force of a touch.
 
 use serde::Serialize;
 use tactflow_runtime::graph::OutlinedBlock;
@@ -19,58 +19,62 @@ pub(super) struct Approach {
     pub(super) reaction_s: f64,
     /// Deceleration of the sensor [m/s²].
     pub(super) deceleration_m_per_s2: f64,
-    /// Way from the image that shows a contact until the sensor rests [m].
-    pub(super) way_m: f64,
-    pub(super) hits: Vec<Hit>,
+    /// Distance from the tick that commands the stop until the sensor rests [m].
+    pub(super) stopping_distance_m: f64,
+    pub(super) impacts: Vec<Impact>,
 }
 
 /// What the moving mass of the arm adds to the force at a touch.
 #[derive(Debug, Serialize)]
-pub(super) struct Hit {
+pub(super) struct Impact {
     pub(super) object: String,
     /// Stiffness of the stiffest contact, as `contact_limit` has it [N/m].
     pub(super) contact_n_per_m: f64,
     /// Resonance of the arm in contact [Hz].
     pub(super) resonance_hz: f64,
-    /// Its force, v √(k m) with m = k/ω² [N].
+    /// Its force, v √(k m) with m = k/ω² and the speed v out of the pad [N].
     pub(super) force_n: f64,
 }
 
 /// Returns the approaches of a mode, and then the search of each limiter for lost contacts.
 pub(super) fn approaches(nodes: &Nodes<'_>, limits: &[Limiter], law: &Law, contacts: &[Contact]) -> Vec<Approach> {
-    let speed = |twist: [f64; 6]| twist[..3].iter().map(|part| part * part).sum::<f64>().sqrt();
-    let constants = law.constants.iter().map(|constant| (constant.node.clone(), speed(constant.twist)));
+    let constants = law.constants.iter().map(|constant| {
+        let [x, y, z, ..] = constant.twist;
+        (constant.node.clone(), [x, y, z])
+    });
     let searches = limits.iter().filter_map(|limiter| {
         let node = nodes.node(&limiter.node)?;
-        Some((limiter.node.clone(), nodes.number(node, "search_m_per_s")?))
+        Some((limiter.node.clone(), [0.0, 0.0, nodes.number(node, "search_m_per_s")?]))
     });
-    let largest = smallest(nodes, limits, "linear_m_per_s").unwrap_or(f64::INFINITY);
-    let found = constants.chain(searches).filter(|(_, speed)| *speed > 0.0);
-    found.filter_map(|(node, speed)| approach(nodes, limits, contacts, (node, speed.min(largest)))).collect()
+    let moves = |(_, velocity): &(String, [f64; 3])| velocity.iter().any(|part| *part != 0.0);
+    constants.chain(searches).filter(moves).filter_map(|found| approach(nodes, limits, contacts, found)).collect()
 }
 
-/// Returns the way to brake and the hits of one motion, or `None` if no limiter says how the sensor decelerates.
+/// Returns the stopping distance and the impacts of one motion, or `None` if no limiter says how the sensor decelerates.
 fn approach(
     nodes: &Nodes<'_>,
     limits: &[Limiter],
     contacts: &[Contact],
-    (node, speed): (String, f64),
+    (node, velocity): (String, [f64; 3]),
 ) -> Option<Approach> {
     let decelerations = ["linear_m_per_s2", "deceleration_m_per_s2"];
     let deceleration = decelerations.iter().filter_map(|key| smallest(nodes, limits, key)).min_by(f64::total_cmp)?;
+    let wanted = velocity.iter().map(|part| part * part).sum::<f64>().sqrt();
+    let speed = smallest(nodes, limits, "linear_m_per_s").map_or(wanted, |most| wanted.min(most));
+    let into = velocity[2].max(0.0) * speed / wanted;
     let latency = contacts.iter().flat_map(|contact| {
         let own = contact.features.values().filter_map(|answer| answer.latency_ms);
         own.chain([contact.latency_ms])
     });
     let reaction = 2.0 * nodes.period() + 1e-3 * latency.fold(0.0, f64::max);
-    let stiffness = smallest(nodes, limits, "contact_n_per_m");
-    let hit = |contact: &Contact| {
+    let stiffness = smallest(nodes, limits, "contact_n_per_m").filter(|_| into > 0.0);
+    let impact = |contact: &Contact| {
         let (stiffness, resonance) = (stiffness?, contact.features.get("pressure")?.resonance_hz?);
-        Some(Hit {
+        Some(Impact {
             object: contact.object.clone(),
             contact_n_per_m: stiffness,
             resonance_hz: resonance,
-            force_n: speed * stiffness / (std::f64::consts::TAU * resonance),
+            force_n: into * stiffness / (std::f64::consts::TAU * resonance),
         })
     };
     Some(Approach {
@@ -78,8 +82,8 @@ fn approach(
         speed_m_per_s: speed,
         reaction_s: reaction,
         deceleration_m_per_s2: deceleration,
-        way_m: speed * reaction + speed * speed / (2.0 * deceleration),
-        hits: contacts.iter().filter_map(hit).collect(),
+        stopping_distance_m: speed * reaction + speed * speed / (2.0 * deceleration),
+        impacts: contacts.iter().filter_map(impact).collect(),
     })
 }
 

@@ -94,8 +94,10 @@ fn verify_all(args: &VerifyArgs, shell: &Shell) -> Result<u8, String> {
         let run = |seed: Option<u64>| {
             format!("{}{}", verified.name(), seed.map_or_else(String::new, |seed| format!(", seed {seed}")))
         };
-        for (why, seed) in verified.failures() {
-            shell.error(format_args!("{}: {why}", run(seed)));
+        for (why, trial) in verified.failures() {
+            let varied =
+                if trial.varied.is_empty() { String::new() } else { format!(" ({})", table::sets(&trial.varied)) };
+            shell.error(format_args!("{}: {why}{varied}", run(trial.seed)));
         }
         for (NotChecked { check, why }, seed) in verified.not_checked() {
             shell.error(format_args!("{}: check `{check}`: {why}", run(seed)));

@@ -10,7 +10,7 @@ use crate::cli::text::number::{count_of, number};
 use crate::cli::text::table::table;
 use crate::scenario::figure::{Bound, Figure};
 use crate::scenario::judge::{FigureRow, Verdict};
-use crate::scenario::{Scenario, Trial};
+use crate::scenario::{Scenario, Trial, assignment};
 
 const HEADER: [&str; 10] =
     ["scenario", "check", "figure", "unit", "median of runs", "bound", "paper", "worst", "95 % interval of median", ""];
@@ -69,11 +69,16 @@ fn describe(scenario: &Scenario) -> String {
 
 /// Names the run in which a figure that failed is worst, with the parameters that vary.
 fn worst_of(row: &FigureRow, trials: &[Trial]) -> Option<String> {
-    let worst = row.worst();
-    let trial = trials.iter().zip(&row.values).find(|(_, value)| **value == worst).map(|(trial, _)| trial)?;
+    let worst = row.worst()?;
+    let trial = trials.iter().zip(&row.values).find(|(_, value)| **value == Some(worst)).map(|(trial, _)| trial)?;
     let seed = trial.seed.filter(|_| row.verdict() == Verdict::Failed && !trial.varied.is_empty())?;
-    let varied: Vec<String> = trial.varied.iter().map(|(path, value)| format!("{path} = {}", number(*value))).collect();
-    Some(format!("  {} of {} is worst with seed {seed}: {}\n", row.figure.name(), row.check, varied.join(", ")))
+    Some(format!("  {} of {} is worst with seed {seed}: {}\n", row.figure.name(), row.check, sets(&trial.varied)))
+}
+
+/// Writes the parameters that vary as arguments of `run`.
+pub(crate) fn sets(varied: &BTreeMap<String, f64>) -> String {
+    let sets: Vec<String> = varied.iter().map(|(path, value)| format!("--set {}", assignment(path, *value))).collect();
+    sets.join(" ")
 }
 
 /// Returns a row that says why there are no figures.
@@ -151,6 +156,8 @@ struct ScenarioJson<'a> {
     for_s: Option<f64>,
     /// Facts of the devices.
     facts: BTreeMap<&'a str, &'a toml::Value>,
+    /// The parameters that vary, with their smallest and largest values.
+    vary: BTreeMap<&'a str, [f64; 2]>,
     runs: &'a [Trial],
     rows: Vec<RowJson<'a>>,
 }
@@ -207,6 +214,7 @@ fn scenario_json(verified: &Verified) -> ScenarioJson<'_> {
         diagnostics: verified.loaded.as_ref().err().map(diagnosed).unwrap_or_default(),
         for_s: scenario.map(|scenario| scenario.for_s),
         facts: facts.map(|(name, fact)| (name.as_str(), fact)).collect(),
+        vary: scenario.into_iter().flat_map(|scenario| scenario.vary.ranges()).collect(),
         runs: &verified.trials,
         rows: verified.rows.iter().map(row_json).collect(),
     }

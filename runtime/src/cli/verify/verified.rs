@@ -20,9 +20,9 @@ impl Verified {
         self.path.file_stem().unwrap_or(self.path.as_os_str()).to_string_lossy().into_owned()
     }
 
-    /// Returns why runs could not be measured, each with the seed of the run.
-    pub(crate) fn failures(&self) -> impl Iterator<Item = (&str, Option<u64>)> {
-        self.trials.iter().filter_map(|trial| Some((trial.failure.as_deref()?, trial.seed)))
+    /// Returns why runs could not be measured, each with its run.
+    pub(crate) fn failures(&self) -> impl Iterator<Item = (&str, &Trial)> {
+        self.trials.iter().filter_map(|trial| Some((trial.failure.as_deref()?, trial)))
     }
 
     /// Returns the checks without a tick to check, each with the seed of the run.

@@ -28,13 +28,14 @@ struct LimitRef<'a> {
 /// Reports values that no node uses, and missing values.
 ///
 /// A misspelt key is both unused and missing; it is reported once, where it is misspelt. While a limiter is missing, an
-/// unused value may belong to it and is not reported. Returns the places of the nodes that read a misspelt one.
+/// unused value may belong to it and is not reported. Returns each parameter that reads a misspelt
+/// one, with the place of its node.
 pub(crate) fn check(
     net: &Net<'_>,
     opened: &OpenedBench,
     sources: &SourceMap,
     diagnostics: &mut Diagnostics,
-) -> Vec<Range<usize>> {
+) -> Vec<(Range<usize>, String)> {
     let mut names = net.flat.scopes.iter().flat_map(|scope| scope.names.values());
     let has_unknown_part = names.any(|(_, entity)| matches!(entity, Entity::Unknown));
     let is_limited =
@@ -60,7 +61,8 @@ pub(crate) fn check(
         let is_meant = |key: &&Key| is_needed || net.catalogue.limit_readers().find(&key.name).is_none();
         if let Some(key) = similar(name, &unused).filter(is_meant).or(only) {
             unused.retain(|other| other.name != key.name);
-            without.extend(limits.iter().map(|limit| net.place(Producer::Node(limit.node))));
+            let param = |limit: &&LimitRef<'_>| limit.spec.map_or_else(String::new, |spec| spec.name.to_owned());
+            without.extend(limits.iter().map(|limit| (net.place(Producer::Node(limit.node)), param(limit))));
             diagnostics.push(misspelt(key, limits, net, sources));
         } else if let Some(key) = similar(name, &given).filter(|_| is_alone && is_needed) {
             diagnostics.push(misspelt_reference(key, limits));
@@ -84,9 +86,14 @@ pub(crate) fn check(
     without
 }
 
-/// Removes what the nodes at these places say of a limit that they lack: its misspelt key is reported.
-pub(crate) fn tell_once(misspelt: &[Range<usize>], diagnostics: &mut Diagnostics) {
-    diagnostics.retain(|found| found.code != Code::MissingLimit || !misspelt.contains(&found.span));
+/// Removes what nodes say of these parameters, which lack a limit: its misspelt key is reported.
+pub(crate) fn tell_once(misspelt: &[(Range<usize>, String)], diagnostics: &mut Diagnostics) {
+    diagnostics.retain(|found| {
+        let is_about = |(place, param): &(Range<usize>, String)| {
+            *place == found.span && found.message.contains(&format!("`{param}`"))
+        };
+        found.code != Code::MissingLimit || !misspelt.iter().any(is_about)
+    });
 }
 
 /// Returns the references in the order of the nodes.
