@@ -144,3 +144,49 @@ fn the_end_of_the_tool_stops_before_a_plane() {
     let (bare, _) = reach(200.0, &plane);
     assert!(bare > 0.3, "without a capsule only the pad stays before the plane: {bare} m");
 }
+
+/// A palm of 36 tactels on a soft ball that covers all of them, with more bindings and limits.
+fn palm(bind: &str, limits: &str) -> String {
+    let files = workspace().join("graphs");
+    let files = files.display();
+    format!(
+        "[bind]\npad = 'palm'\narm = 'palm'\ntruth = 'palm'\n{bind}\n[devices.palm]\ntype = 'sim_bench'\nfor_s = 12.0\n\
+         calibration = '{files}/calibrations/hand_pad.toml'\nrobot = '{files}/robots/hand.toml'\ntip = 'palm'\n\
+         home = [0.0]\nstiffness = 2000.0\ninertia = [0.2]\nfriction = 0.05\nrows = 6\ncols = 6\npitch = 0.003\n\
+         mount = {{ xyz = [0.0, 0.0, -0.012], rpy = [{:?}, 0.0, 0.0] }}\n\
+         objects = [{{ shape = 'ball', radius = 0.02, at = [0.0, 0.0, 0.03], stiffness = 200.0 }}]\n\
+         [limits]\nforce_n = 4.0\npeak_n = 1.5\nworkspace_min_m = [-0.2, -0.2, -0.2]\n\
+         workspace_max_m = [0.3, 0.2, 0.2]\n{limits}\n",
+        std::f64::consts::PI
+    )
+}
+
+/// Returns the largest true force [N] while the zeros of the palm sink.
+fn largest_while_zeros_sink(bench: &str, raw_per_s: f64) -> f64 {
+    let (folder, path) = crate::cli::in_new_folder("sinks.toml");
+    let records = folder.path().join("records");
+    std::fs::write(folder.path().join("palm.toml"), bench).unwrap();
+    let scenario = format!(
+        "[scenario]\ngraph = '{}'\nbench = 'palm.toml'\nfor_s = 8.0\n[check.force]\nof = 'truth.force'\nnever_above = 4.1\n\
+         [[inject]]\nrole = 'pad'\nfault = 'drift'\nreading_per_s = {:?}\nfrom_s = 3.0\n",
+        workspace().join("graphs/force.toml").display(),
+        -raw_per_s
+    );
+    std::fs::write(&path, scenario).unwrap();
+    let said = crate::tool::say(&["verify", &path, "--out", &records.display().to_string()]);
+    let text = std::fs::read_to_string(records.join("sinks.csv")).unwrap_or_else(|error| panic!("{error}: {}{}", said.out, said.err));
+    let mut lines = text.lines().filter(|line| !line.starts_with('#')).map(|line| line.split(','));
+    let column = lines.next().unwrap().position(|name| name == "truth.force").expect("the bench knows the force");
+    lines.filter_map(|mut row| row.nth(column)?.parse().ok()).fold(0.0, f64::max)
+}
+
+#[test]
+fn a_zero_that_sinks_under_a_covered_pad_is_seen_by_the_second_ceiling_alone() {
+    // No reading of the pad shows it: the arm presses on, to hold the reading.
+    let blind = largest_while_zeros_sink(&palm("", ""), 200.0);
+    assert!(blind > 10.0, "{blind} N");
+    for raw_per_s in [50.0, 200.0, 1000.0] {
+        let force = largest_while_zeros_sink(&palm("force = 'palm'", "wrench_n = 4.0"), raw_per_s);
+        assert!((3.0..4.1).contains(&force), "{force} N while the zeros sink by {raw_per_s} raw per second");
+    }
+}
