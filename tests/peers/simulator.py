@@ -376,12 +376,21 @@ def main():
     parser.add_argument("--silence", type=float, default=3.0, help="how long it stays when it is silent [s]")
     parser.add_argument("--first", type=int, default=1, help="number of the first frame")
     parser.add_argument("--clock", type=float, default=0.0, help="time of the first frame [s]")
+    parser.add_argument("--again", action="store_true", help="take one connection after the other; the arm stays where it is")
     args = parser.parse_args()
     world = World(args)
     with socket.create_server(("127.0.0.1", args.port)) as server:
         server.settimeout(60.0)
         print(server.getsockname()[1], flush=True)
         connection, _ = server.accept()
+        while args.again:
+            session(connection, args, world)
+            connection, _ = server.accept()
+    session(connection, args, world)
+
+
+def session(connection, args, world):
+    """One connection, from the hello message to the end."""
     connection.settimeout(60.0)
     with connection:
         link = Link(connection)

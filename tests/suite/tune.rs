@@ -6,7 +6,8 @@ use std::path::Path;
 use serde_json::Value;
 
 use crate::cli::in_new_folder;
-use crate::tool::say;
+use crate::lockstep::Peer;
+use crate::tool::{peer, say};
 
 /// The text of a shipped file, with the files that it names at their own places.
 fn shipped(file: &str) -> String {
@@ -72,4 +73,37 @@ fn a_loop_that_pushes_the_wrong_way_gets_no_gains() {
     let said = say(&["tune", "graphs/hybrid.toml", "--feature", "x", "--set", set]);
     assert_eq!(said.code, 1, "{}{}", said.out, said.err);
     assert!(said.out.contains("No gain"), "{}", said.out);
+}
+
+#[test]
+fn the_bode_plot_shows_the_margins_and_what_was_measured() {
+    let (_folder, path) = in_new_folder("bode.svg");
+    let said = say(&["tune", "graphs/edge.toml", "--feature", "orientation", "--svg", &path, "--format", "json"]);
+    assert_eq!(said.code, 0, "{}{}", said.out, said.err);
+    let tuned: Value = serde_json::from_str(&said.out).unwrap();
+    let feature = &tuned["features"][0];
+    let margins = &feature["margins"][0];
+    let drawn = peer("bode.py", &[&path]);
+    let drawn: Vec<f64> = drawn.split_whitespace().map(|word| word.parse().unwrap()).collect();
+    let [crossover, phase, dots, far] = drawn[..] else { panic!("{drawn:?}") };
+    assert!((crossover / margins["crossover_hz"].as_f64().unwrap() - 1.0).abs() < 0.02, "{drawn:?}: {margins}");
+    assert!((phase - margins["phase_deg"].as_f64().unwrap()).abs() < 1.5, "{drawn:?}: {margins}");
+    let frequencies = feature["answers"][0]["fits"][0][1]["frequencies"].as_f64().unwrap();
+    assert_eq!(dots, 2.0 * frequencies, "{drawn:?}");
+    assert!(far < 3.0, "a dot is {far} dB beside the fit");
+}
+
+/// Each run opens the simulator again, whose arm stands where the last run has left it.
+#[test]
+#[ignore = "it takes more than a minute: `.ci/edge` runs it"]
+fn a_loop_is_measured_on_a_simulator_that_does_not_start_again() {
+    let simulator = Peer::start("--again --seconds 90");
+    let address = format!("devices.bench.address=127.0.0.1:{}", simulator.port);
+    let bench = ["--bench", "graphs/benches/lockstep.toml", "--set", &address];
+    let said =
+        say(&[&["tune", "graphs/hybrid.toml", "--feature", "pressure", "--format", "json"], &bench[..]].concat());
+    assert_eq!(said.code, 0, "{}{}", said.out, said.err);
+    let tuned: Value = serde_json::from_str(&said.out).unwrap();
+    let fit = &tuned["features"][0]["answers"][0]["fits"][0][1];
+    assert!(fit["residual"].as_f64().unwrap() < 0.3 && fit["gain"].as_f64().unwrap() > 5.0, "{fit}");
 }

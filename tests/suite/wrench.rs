@@ -174,7 +174,8 @@ fn largest_while_zeros_sink(bench: &str, raw_per_s: f64) -> f64 {
     );
     std::fs::write(&path, scenario).unwrap();
     let said = crate::tool::say(&["verify", &path, "--out", &records.display().to_string()]);
-    let text = std::fs::read_to_string(records.join("sinks.csv")).unwrap_or_else(|error| panic!("{error}: {}{}", said.out, said.err));
+    let text = std::fs::read_to_string(records.join("sinks.csv"))
+        .unwrap_or_else(|error| panic!("{error}: {}{}", said.out, said.err));
     let mut lines = text.lines().filter(|line| !line.starts_with('#')).map(|line| line.split(','));
     let column = lines.next().unwrap().position(|name| name == "truth.force").expect("the bench knows the force");
     lines.filter_map(|mut row| row.nth(column)?.parse().ok()).fold(0.0, f64::max)

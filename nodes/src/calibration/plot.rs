@@ -31,8 +31,8 @@ pub fn svg(report: &CalibrationReport) -> String {
     let (min, max) = readings.fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), x| (a.min(x), b.max(x)));
     // From zero, unless all curves would be on one side.
     let from = if min > 0.0 && min < 0.5 * max { 0.0 } else { min };
-    let x = PlotAxis { from, to: (from + 1.02 * (max - from)).max(from + 1e-9), pixels: [FRAME[0][0], FRAME[1][0]] };
-    let y = PlotAxis { from: 0.0, to: 1.04 * report.most, pixels: [FRAME[1][1], FRAME[0][1]] };
+    let x = PlotAxis::linear(from, (from + 1.02 * (max - from)).max(from + 1e-9), [FRAME[0][0], FRAME[1][0]]);
+    let y = PlotAxis::linear(0.0, 1.04 * report.most, [FRAME[1][1], FRAME[0][1]]);
     let title = format!(
         "Force over reading, {count} of {} x {} tactels, {} curves",
         calibration.rows,

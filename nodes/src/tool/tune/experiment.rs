@@ -1,8 +1,6 @@
 //! One run with a test signal: the frequency response of a loop, measured while it is closed.
 
 use std::f64::consts::PI;
-use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
 
 use nalgebra::Complex;
 use tactflow_runtime::catalogue::Catalogue;
@@ -10,6 +8,7 @@ use tactflow_runtime::engine::{End, Engine, RunOptions, run};
 use tactflow_runtime::graph::{Outline, OutlinedMode, Request, compile};
 use tactflow_runtime::record::PortColumns;
 
+use super::lift;
 use crate::tool::control::law::{COMPONENTS, Feature};
 use crate::tool::control::shape::turn;
 
@@ -75,6 +74,7 @@ impl Sine {
 pub(super) struct Experiment<'a> {
     pub(super) catalogue: &'a Catalogue,
     pub(super) request: &'a Request,
+    pub(super) outline: &'a Outline,
     pub(super) mode: &'a OutlinedMode,
     /// The node that adds the test signal to the motion.
     pub(super) adder: &'a str,
@@ -130,9 +130,14 @@ pub(super) fn long_enough(outline: &Outline, seconds: f64) -> impl Iterator<Item
     limited.map(move |device| format!("devices.{}.for_s={seconds:?}", device.name))
 }
 
-/// Returns how long an experiment takes at most, for ticks of `period` [s].
+/// Returns how long the mode is measured, for ticks of `period` [s].
+pub(super) fn measured(period: f64) -> f64 {
+    Sine::all(period).last().map_or(0.0, |sine| sine.end() as f64 * period)
+}
+
+/// Returns how long a run takes at most, for ticks of `period` [s].
 pub(super) fn duration(period: f64) -> f64 {
-    APPROACH_S + Sine::all(period).last().map_or(0.0, |sine| sine.end() as f64 * period)
+    APPROACH_S + measured(period) + lift::LASTS_S
 }
 
 impl Experiment<'_> {
@@ -153,9 +158,7 @@ impl Experiment<'_> {
         let sines = Sine::all(self.period);
         let wanted = sines.last().map_or(0, Sine::end);
         let (mut rows, mut left): (Vec<[f64; 2]>, Option<String>) = (Vec::new(), None);
-        let cancel = Arc::new(AtomicBool::new(false));
-        let options =
-            RunOptions { duration: Some(duration(self.period)), cancel: Some(cancel.clone()), ..RunOptions::default() };
+        let options = RunOptions { duration: Some(duration(self.period)), ..RunOptions::default() };
         let column = self.feature.column[self.component];
         let outcome = run(&mut engine, &options, &mut |engine| {
             let is_in = engine.mode() == Some(&*self.mode.name);
@@ -165,12 +168,11 @@ impl Experiment<'_> {
             if is_in && rows.len() < wanted {
                 let read = |port| engine.bus().scalar(port).unwrap_or(f64::NAN);
                 rows.push([read(control) * column, read(all)]);
-                cancel.store(rows.len() >= wanted, Ordering::Relaxed);
             }
         });
         let outcome = outcome.map_err(|error| format!("the run cannot start: {error}"))?;
         Ok(match (&outcome.end, left) {
-            (End::Interrupted, _) if outcome.signal.is_some() => Answered::Interrupted,
+            (End::Interrupted, _) => Answered::Interrupted,
             (End::Fault(fault), _) => Answered::Nothing(fault.to_string()),
             (_, Some(mode)) => Answered::Nothing(format!("the mode `{}` was left for `{mode}`", self.mode.name)),
             _ if rows.len() < wanted => {
@@ -184,11 +186,11 @@ impl Experiment<'_> {
         })
     }
 
-    /// Returns the settings of a run: the signal, its way into the motion, and half of the gains.
+    /// Returns the settings of a run: the signal, its way into the motion, half of the gains, and the end.
     fn settings(&self, way: f64) -> Vec<String> {
         let unit = if self.component < 3 { "m/s" } else { "rad/s" };
         let fastest = FASTEST[self.component / 3];
-        let mut set = Vec::new();
+        let mut set = lift::settings(self.outline, self.mode, self.adder, measured(self.period) + self.period);
         for (i, sine) in Sine::all(self.period).iter().enumerate() {
             let hz = 1.0 / (sine.ticks as f64 * self.period);
             let lasts = (sine.end() - sine.begin) as f64 * self.period;

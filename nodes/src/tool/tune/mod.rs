@@ -1,7 +1,9 @@
 //! `tactflow tune`: measures how the features answer, and proposes gains with margins.
 
+mod bode;
 mod experiment;
 mod fit;
+mod lift;
 mod page;
 mod save;
 mod trial;
@@ -12,8 +14,9 @@ use std::path::PathBuf;
 use serde::Serialize;
 use tactflow_runtime::cli::clap::{self, ValueEnum};
 use tactflow_runtime::cli::{GraphArgs, Shell};
-use tactflow_runtime::graph::{Compiled, OutlinedMode, Request, compile};
+use tactflow_runtime::graph::{Outline, OutlinedMode, Request, compile};
 
+use super::arguments::{may_replace, write};
 use super::control::chain::chain;
 use super::control::choose::{Wanted, factor};
 use super::control::contacts::{Answer, Contact};
@@ -37,6 +40,7 @@ proposes the largest gains that keep the margins over all contacts. Then it runs
 Examples:
   tactflow tune graphs/hybrid.toml
   tactflow tune graphs/hybrid.toml --feature pressure --with graphs/benches/pen.toml --with graphs/benches/toy_box.toml
+  tactflow tune graphs/edge.toml --svg bode.svg  draw the loops as a Bode plot
   tactflow tune graphs/force.toml --save        write the gains into the graph, and the contacts into the benches
 
 Exit codes: 0 success; 1 no gains are proposed for a feature; 2 the graph does not load, or has nothing to tune; 130
@@ -68,6 +72,9 @@ pub(super) struct TuneArgs {
     /// Write the gains into the graph, and the contacts into the benches; comments stay
     #[arg(long)]
     save: bool,
+    /// Draw the loops as a Bode plot: what is measured, and the fit with the proposed gains
+    #[arg(long, value_name = "FILE.svg")]
+    svg: Option<PathBuf>,
     /// Output format
     #[arg(long, value_enum, default_value_t = Format::Text, value_name = "FORMAT")]
     format: Format,
@@ -111,6 +118,9 @@ struct TunedFeature {
     margins: Vec<Margins>,
     #[serde(skip)]
     feature: Feature,
+    /// The loops with the new gains, or with those of the graph if there are no new ones, each with its contact.
+    #[serde(skip)]
+    loops: Vec<(usize, Loop)>,
 }
 
 /// The answer of a feature over one contact.
@@ -119,6 +129,9 @@ struct Found {
     object: String,
     /// For each component that moves the feature: its name, and the fit.
     fits: Vec<(&'static str, Fit)>,
+    /// What was measured, for each component.
+    #[serde(skip)]
+    lines: Vec<Vec<Line>>,
     /// Why there is no fit.
     refused: Option<String>,
 }
@@ -136,9 +149,14 @@ impl From<String> for Stop {
 }
 
 pub(super) fn run(args: TuneArgs, shell: &Shell) -> Result<u8, u8> {
+    let replaces = |path: &PathBuf| may_replace(path, "an SVG picture", |text| text.contains("<svg"));
+    args.svg.as_ref().map_or(Ok(()), replaces).map_err(|message| shell.refuse(message))?;
     let request = args.graph_args.request(args.graph.clone());
+    // Each run opens the devices by itself, and most devices can be open once.
     let compiled = compile(shell.catalogue(), &request).map_err(|report| shell.reject(&report))?;
-    let tuned = match tune(&args, shell, &request, &compiled) {
+    let outline = compiled.outline().clone();
+    drop(compiled);
+    let tuned = match tune(&args, shell, &request, &outline) {
         Ok(tuned) => tuned,
         Err(Stop::Interrupted) => return Ok(130),
         Err(Stop::Refused(message)) => return Err(shell.refuse(message)),
@@ -147,10 +165,14 @@ pub(super) fn run(args: TuneArgs, shell: &Shell) -> Result<u8, u8> {
         Format::Json => shell.say_json(&tuned),
         Format::Text => shell.say(page::text(&tuned).trim_end()),
     }
+    if let Some(path) = &args.svg {
+        write(path, &bode::svg(&tuned)).map_err(|message| shell.refuse(message))?;
+        shell.say_beside(&format!("wrote {}", path.display()));
+    }
     let is_whole =
         tuned.features.iter().all(|feature| feature.new.is_some()) && tuned.settled.iter().all(Settled::is_good);
     if args.save && is_whole {
-        let written = save::save(&args, &compiled, &tuned, shell).map_err(|message| shell.refuse(message))?;
+        let written = save::save(&args, &outline, &tuned, shell).map_err(|message| shell.refuse(message))?;
         shell.say(&written);
     } else if args.save {
         shell.warning("nothing is written: not all features have gains that hold");
@@ -158,8 +180,7 @@ pub(super) fn run(args: TuneArgs, shell: &Shell) -> Result<u8, u8> {
     Ok(u8::from(!is_whole))
 }
 
-fn tune(args: &TuneArgs, shell: &Shell, request: &Request, compiled: &Compiled) -> Result<Tuned, Stop> {
-    let outline = compiled.outline();
+fn tune(args: &TuneArgs, shell: &Shell, request: &Request, outline: &Outline) -> Result<Tuned, Stop> {
     let (command, port) = settings::commands(outline).next().ok_or("no role is an arm, so nothing moves".to_owned())?;
     let index = Index::new(outline);
     let (_, twist) = chain(&Nodes::new(&index, None), port)?;
@@ -179,6 +200,7 @@ fn tune(args: &TuneArgs, shell: &Shell, request: &Request, compiled: &Compiled) 
             let experiment = Experiment {
                 catalogue: shell.catalogue(),
                 request: &request,
+                outline,
                 mode,
                 adder: &adder,
                 feature,
@@ -202,7 +224,8 @@ fn tune(args: &TuneArgs, shell: &Shell, request: &Request, compiled: &Compiled) 
     let arm = command.trim_end_matches(".velocity").to_owned();
     let mut tuned = Tuned { mode: mode.name.clone(), arm, wanted, contacts, files, features, settled: Vec::new() };
     for (bench, contact) in benches.iter().zip(&tuned.contacts) {
-        let (request, _) = on_bench(request, bench.as_ref(), shell)?;
+        let (mut request, _) = on_bench(request, bench.as_ref(), shell)?;
+        request.set.extend(lift::settings(outline, mode, &adder, experiment::measured(outline.period_s)));
         tuned.settled.extend(trial::compare(shell.catalogue(), &request, mode, &tuned.features, &contact.object)?);
     }
     Ok(tuned)
@@ -256,12 +279,12 @@ fn on_bench(request: &Request, bench: Option<&PathBuf>, shell: &Shell) -> Result
     let mut request = Request { bench: bench.cloned().or_else(|| request.bench.clone()), ..request.clone() };
     let compiled = compile(shell.catalogue(), &request).map_err(|report| report.render(false))?;
     request.set.extend(experiment::long_enough(compiled.outline(), experiment::duration(compiled.outline().period_s)));
-    Ok((request, bench_file(&compiled)))
+    Ok((request, bench_file(compiled.outline())))
 }
 
 /// Returns the file of the bench that a request uses, as the places of its devices say.
-fn bench_file(compiled: &Compiled) -> Option<PathBuf> {
-    compiled.outline().devices.first().map(|device| PathBuf::from(&device.place.file))
+fn bench_file(outline: &Outline) -> Option<PathBuf> {
+    outline.devices.first().map(|device| PathBuf::from(&device.place.file))
 }
 
 /// Returns the name of what a feature measures.
@@ -284,7 +307,7 @@ const MAX_RESIDUAL: f64 = 0.3;
 fn identify(experiment: &Experiment<'_>, object: &str, period: f64, shell: &Shell) -> Result<Found, Stop> {
     let feature = experiment.feature;
     let components: Vec<usize> = (0..6).filter(|i| feature.column[*i] != 0.0).collect();
-    let mut found = Found { object: object.to_owned(), fits: Vec::new(), refused: None };
+    let mut found = Found { object: object.to_owned(), fits: Vec::new(), lines: Vec::new(), refused: None };
     for component in components {
         let experiment = Experiment { component, ..experiment.clone() };
         let known = known(feature, component, period);
@@ -296,7 +319,10 @@ fn identify(experiment: &Experiment<'_>, object: &str, period: f64, shell: &Shel
                         100.0 * fit.residual
                     ));
                 }
-                Ok(fit) => found.fits.push((super::control::law::COMPONENTS[component], fit)),
+                Ok(fit) => {
+                    found.fits.push((super::control::law::COMPONENTS[component], fit));
+                    found.lines.push(lines);
+                }
                 Err(few) => {
                     found.refused = Some(format!(
                         "only {few} of {} frequencies answer with a coherence of {} or more, and a fit needs {ENOUGH}",
@@ -383,11 +409,16 @@ fn answer(quantity: &str, fits: &[(&'static str, Fit)]) -> Answer {
 fn propose(feature: Feature, answers: Vec<Found>, contacts: &[Contact], wanted: Wanted, period: f64) -> TunedFeature {
     let old = [feature.kp, feature.ki, feature.kd];
     let is_measured = answers.iter().all(|found| found.refused.is_none());
-    let loops: Vec<Loop> = contacts.iter().filter_map(|contact| Loop::over(&feature, contact, period)).collect();
-    let factor = factor(&loops, wanted).filter(|_| is_measured && loops.len() == contacts.len());
+    let loops = contacts.iter().enumerate();
+    let loops: Vec<(usize, Loop)> =
+        loops.filter_map(|(i, contact)| Some((i, Loop::over(&feature, contact, period)?))).collect();
+    let each: Vec<Loop> = loops.iter().map(|(_, around)| around.clone()).collect();
+    let factor = factor(&each, wanted).filter(|_| is_measured && loops.len() == contacts.len());
     // Rounded down, so that the margins hold.
     let factor = factor.map(|factor| page::rounded_down(feature.kp * factor) / feature.kp);
     let new = factor.map(|factor| old.map(|gain| page::rounded(gain * factor)));
-    let margins = factor.map(|factor| loops.iter().map(|around| margins(&around.times(factor))).collect());
-    TunedFeature { name: feature.name.clone(), answers, old, new, margins: margins.unwrap_or_default(), feature }
+    let loops: Vec<(usize, Loop)> =
+        loops.into_iter().map(|(i, around)| (i, around.times(factor.unwrap_or(1.0)))).collect();
+    let margins = new.map(|_| loops.iter().map(|(_, around)| margins(around)).collect()).unwrap_or_default();
+    TunedFeature { name: feature.name.clone(), answers, old, new, margins, feature, loops }
 }

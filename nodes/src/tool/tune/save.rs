@@ -1,7 +1,7 @@
 //! Writes the gains into the graph, and the contacts into the benches. Comments and order stay.
 
 use tactflow_runtime::cli::Shell;
-use tactflow_runtime::graph::Compiled;
+use tactflow_runtime::graph::Outline;
 use toml_edit::{Array, InlineTable, Value};
 
 use super::{TuneArgs, Tuned, experiment};
@@ -12,9 +12,9 @@ use crate::tool::guided::BenchFile;
 ///
 /// # Errors
 /// If a file cannot be changed; then nothing is written.
-pub(super) fn save(args: &TuneArgs, compiled: &Compiled, tuned: &Tuned, shell: &Shell) -> Result<String, String> {
+pub(super) fn save(args: &TuneArgs, outline: &Outline, tuned: &Tuned, shell: &Shell) -> Result<String, String> {
     let mut graph = BenchFile::read(&args.graph)?;
-    let mode = compiled.outline().modes.iter().find(|mode| mode.name == tuned.mode);
+    let mode = outline.modes.iter().find(|mode| mode.name == tuned.mode);
     for one in &tuned.features {
         let (Some(pid), Some(mode), Some(new)) = (&one.feature.pid, mode, one.new) else { continue };
         for ((key, old), gain) in

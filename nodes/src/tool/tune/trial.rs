@@ -6,7 +6,7 @@ use tactflow_runtime::engine::{End, Engine, RunOptions, run};
 use tactflow_runtime::graph::{OutlinedMode, Request, compile};
 use tactflow_runtime::record::PortColumns;
 
-use super::{Stop, TunedFeature, experiment};
+use super::{Stop, TunedFeature, experiment, lift};
 
 /// How a task holds a feature.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -30,7 +30,8 @@ impl Settled {
 /// Largest error with the new gains, as a multiple of that with the old ones.
 const WORSE: f64 = 1.5;
 
-/// Runs the task with both gains, and compares how it holds each feature that has new ones.
+/// Runs the task with both gains, and compares how it holds each feature that has new ones. The request lets the sensor
+/// lift off at the end.
 pub(super) fn compare(
     catalogue: &Catalogue,
     request: &Request,
@@ -89,7 +90,7 @@ fn hold(
     let failure = match (&outcome.end, left) {
         (End::Interrupted, _) => return Err(Stop::Interrupted),
         (End::Fault(fault), _) => Some(fault.to_string()),
-        (_, Some(mode)) => Some(format!("the task goes on to `{mode}`")),
+        (_, Some(mode)) if mode != lift::MODE => Some(format!("the task goes on to `{mode}`")),
         _ => None,
     };
     let last = &rows[rows.len() / 2..];

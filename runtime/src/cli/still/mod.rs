@@ -67,7 +67,7 @@ fn draw(title: &str, view: &RunView, changes: &[ModeChange]) -> String {
     }
     let Some([from, to]) = view.span().filter(|_| !panels.is_empty()) else { return svg.finish() };
     let to = if is_flat(from, to) { from + 1.0 } else { to };
-    let time = PlotAxis { from, to, pixels: CURVES };
+    let time = PlotAxis::linear(from, to, CURVES);
     draw_modes(&mut svg, time, changes, bottom);
     for (i, panel) in panels.iter().enumerate() {
         let is_last = i + 1 == panels.len();

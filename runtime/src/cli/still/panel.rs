@@ -71,7 +71,7 @@ impl Panel<'_> {
             true => 0.5 * high.abs(),
             false => 0.05 * (high - low),
         };
-        let y = PlotAxis { from: low - margin, to: high + margin, pixels: [self.bottom, self.top] };
+        let y = PlotAxis::linear(low - margin, high + margin, [self.bottom, self.top]);
         svg.axes(time, y, [title, Some(&format!("[{}]", self.unit))]);
         for ((i, curve), [left, row]) in self.legend() {
             let colour = COLOURS[i % COLOURS.len()];
@@ -133,7 +133,7 @@ mod tests {
             series.add(*value);
             times.add(i as f64);
         }
-        let time = PlotAxis { from: 0.0, to: values.len() as f64, pixels: [0.0, width] };
+        let time = PlotAxis::linear(0.0, values.len() as f64, [0.0, width]);
         segments(series.bins(), times.bins(), time)
     }
 

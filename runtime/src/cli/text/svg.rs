@@ -80,33 +80,56 @@ impl Svg {
     }
 }
 
-/// A linear axis.
+/// An axis of a plot.
 #[derive(Debug, Clone, Copy)]
 pub struct PlotAxis {
     /// Value at the start.
-    pub from: f64,
+    from: f64,
     /// Value at the end.
-    pub to: f64,
+    to: f64,
     /// Position of both ends [px].
-    pub pixels: [f64; 2],
+    pixels: [f64; 2],
+    is_log: bool,
 }
 
 impl PlotAxis {
+    /// Returns a linear axis from one value to another, with the positions of both [px].
+    #[must_use]
+    pub const fn linear(from: f64, to: f64, pixels: [f64; 2]) -> Self {
+        Self { from, to, pixels, is_log: false }
+    }
+
+    /// Returns a logarithmic axis from one positive value to a larger one, with the positions of both [px].
+    #[must_use]
+    pub const fn log(from: f64, to: f64, pixels: [f64; 2]) -> Self {
+        Self { from, to, pixels, is_log: true }
+    }
+
     /// Returns the position of a value [px].
     #[must_use]
     pub fn at(&self, value: f64) -> f64 {
         let [start, end] = self.pixels;
-        start + (value - self.from) / (self.to - self.from) * (end - start)
+        let share = match self.is_log {
+            true => libm::log(value / self.from) / libm::log(self.to / self.from),
+            false => (value - self.from) / (self.to - self.from),
+        };
+        start + share * (end - start)
     }
 
-    /// Returns four to eleven round numbers along the axis, or fewer if it is shorter than 200 px.
+    /// Returns four to eleven round numbers along the axis, or fewer if it is shorter than 200 px. On a logarithmic axis
+    /// they are 1, 2 and 5 times the powers of ten.
     #[must_use]
     pub fn ticks(&self) -> Vec<f64> {
+        // Parsed, since a product of tens is not exact.
+        let powers = (-12..12).filter_map(|k| format!("1e{k}").parse::<f64>().ok());
+        if self.is_log {
+            let all = powers.flat_map(|power| [power, 2.0 * power, 5.0 * power]);
+            let [least, most] = [self.from * (1.0 - 1e-9), self.to * (1.0 + 1e-9)];
+            return all.filter(|tick| (least..=most).contains(tick)).collect();
+        }
         let length = (self.pixels[1] - self.pixels[0]).abs();
         let raw = (self.to - self.from) / if length < 200.0 { 2.0 } else { 5.0 };
-        // Parsed, since a product of tens is not exact.
-        let powers = (-12..12).filter_map(|k| format!("1e{k}").parse().ok());
-        let power: f64 = powers.take_while(|power| *power <= raw).last().unwrap_or(raw);
+        let power = powers.take_while(|power| *power <= raw).last().unwrap_or(raw);
         let step = [5.0, 2.0, 1.0].into_iter().map(|by| by * power).find(|step| *step <= raw).unwrap_or(power);
         let first = (self.from / step).ceil() as i64;
         (first..).map(|k| k as f64 * step).take_while(|tick| *tick <= self.to + 1e-9 * step).collect()
@@ -137,18 +160,21 @@ mod tests {
             (310.0, 340.0, 310.0, 5.0),
             (0.0, 1e-5, 0.0, 2e-6),
         ] {
-            let ticks = PlotAxis { from, to, pixels: [0.0, 400.0] }.ticks();
+            let ticks = PlotAxis::linear(from, to, [0.0, 400.0]).ticks();
             assert!((4..=11).contains(&ticks.len()), "{from}..{to}: {ticks:?}");
             assert!((ticks[0] - first).abs() < 1e-9 && (ticks[1] - ticks[0] - step).abs() < 1e-9 * step, "{ticks:?}");
-            let few = PlotAxis { from, to, pixels: [100.0, 0.0] }.ticks();
+            let few = PlotAxis::linear(from, to, [100.0, 0.0]).ticks();
             assert!((1..=5).contains(&few.len()), "{from}..{to}: {few:?}");
         }
     }
 
     #[test]
     fn an_axis_ends_where_its_pixels_end() {
-        let axis = PlotAxis { from: 10.0, to: 30.0, pixels: [424.0, 24.0] };
+        let axis = PlotAxis::linear(10.0, 30.0, [424.0, 24.0]);
         assert_eq!([axis.at(10.0), axis.at(20.0), axis.at(30.0)], [424.0, 224.0, 24.0]);
+        let axis = PlotAxis::log(0.1, 10.0, [0.0, 200.0]);
+        assert_eq!([axis.at(0.1), axis.at(1.0), axis.at(10.0)].map(f64::round), [0.0, 100.0, 200.0]);
+        assert_eq!(axis.ticks(), [0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0]);
     }
 
     #[test]

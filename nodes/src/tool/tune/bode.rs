@@ -1,0 +1,174 @@
+//! The Bode plot of `tune`: each loop with its gains, as fitted and as measured.
+//!
+//! A curve is L(f) of the model, a dot is a measured frequency. The phase of a dot is drawn next to its curve.
+
+use std::f64::consts::PI;
+
+use nalgebra::Complex;
+use tactflow_runtime::cli::svg::{PlotAxis, Svg};
+
+use super::experiment::Line;
+use super::{Tuned, TunedFeature, fit};
+use crate::tool::control::response::Loop;
+
+/// Width of the picture [px].
+const WIDTH: f64 = 760.0;
+/// Left and right end of the curves [px].
+const ACROSS: [f64; 2] = [72.0, 744.0];
+/// Heights of the panels of magnitude and phase [px].
+const PANELS: [f64; 2] = [200.0, 160.0];
+/// Space between two panels, and below the last one of a feature [px].
+const GAPS: [f64; 2] = [16.0, 56.0];
+/// Height of a line of text [px].
+const LINE: f64 = 18.0;
+
+/// Range of the frequencies [Hz].
+const HZ: [f64; 2] = [0.1, 20.0];
+/// Number of points of a curve.
+const POINTS: usize = 200;
+/// Range of the magnitude [dB], and of the phase [deg].
+const MAGNITUDE: [f64; 2] = [-50.0, 30.0];
+const PHASE: [f64; 2] = [-360.0, 0.0];
+
+/// The colour and the dashes of each contact: colours that differ for colour-blind readers, and dashes for grey prints.
+const STYLES: [(&str, &str); 6] = [
+    ("#3d85c6", ""),
+    ("#d9730d", "9 4"),
+    ("#009e73", "3 3"),
+    ("#cc79a7", "9 3 2 3"),
+    ("#8a8a00", "15 4"),
+    ("#c8553d", "2 5"),
+];
+
+/// Returns the picture of all features.
+pub(super) fn svg(tuned: &Tuned) -> String {
+    let heights = tuned.features.iter().map(|feature| {
+        LINE * (feature.answers.len() + 1) as f64 + PANELS.iter().sum::<f64>() + 2.0 * GAPS[0] + GAPS[1]
+    });
+    let mut svg = Svg::new([WIDTH, 16.0 + heights.sum::<f64>()], &format!("Loops of the mode {}", tuned.mode));
+    let mut top = 16.0;
+    for feature in &tuned.features {
+        top = block(&mut svg, feature, top);
+    }
+    svg.finish()
+}
+
+/// Draws one feature, and returns where the next one begins [px].
+fn block(svg: &mut Svg, feature: &TunedFeature, top: f64) -> f64 {
+    let [kp, ki, kd] = feature.new.unwrap_or(feature.old);
+    let whose = if feature.new.is_some() { "the proposed gains" } else { "the gains of the graph" };
+    svg.text([ACROSS[0], top + 12.0], "start", &format!("{}, with {whose}: kp {kp}, ki {ki}, kd {kd}", feature.name));
+    let mut below = top + LINE;
+    for (i, found) in feature.answers.iter().enumerate() {
+        svg.text([ACROSS[0] + 44.0, below + 12.0], "start", &legend(feature, i));
+        let line = [[ACROSS[0], below + 8.0], [ACROSS[0] + 36.0, below + 8.0]];
+        if found.refused.is_none() {
+            styled(svg, i, |svg| svg.polyline(line));
+        }
+        below += LINE;
+    }
+    let hz = PlotAxis::log(HZ[0], HZ[1], ACROSS);
+    let middle = below + GAPS[0] + PANELS[0];
+    let magnitude = PlotAxis::linear(MAGNITUDE[0], MAGNITUDE[1], [middle, below + GAPS[0]]);
+    let bottom = middle + GAPS[0] + PANELS[1];
+    let phase = PlotAxis::linear(PHASE[0], PHASE[1], [bottom, middle + GAPS[0]]);
+    svg.axes(hz, magnitude, [None, Some("|L| [dB]")]);
+    svg.axes(hz, phase, [Some("frequency [Hz]"), Some("phase of L [deg]")]);
+    // Where the margins are read.
+    for at in [magnitude.at(0.0), phase.at(-180.0)] {
+        svg.group("fill=\"none\" stroke=\"#888888\"", |svg| svg.polyline(ACROSS.map(|x| [x, at])));
+    }
+    let measured = feature.loops.iter().filter(|(i, _)| feature.answers[*i].refused.is_none());
+    for (i, around) in measured {
+        let curve = curve(around);
+        draw(svg, *i, hz, [(magnitude, MAGNITUDE, 1), (phase, PHASE, 2)], &curve, &dots(feature, *i, &curve));
+    }
+    bottom + GAPS[1]
+}
+
+/// Returns the name of a contact with its margins.
+fn legend(feature: &TunedFeature, i: usize) -> String {
+    let found = &feature.answers[i];
+    match (&found.refused, feature.margins.get(i)) {
+        (Some(_), _) => format!("{}: not measured", found.object),
+        (None, None) => found.object.clone(),
+        (None, Some(margins)) => {
+            let with = |value: Option<f64>, unit: &str| {
+                value.map_or_else(|| "none".to_owned(), |value| format!("{value:.1} {unit}"))
+            };
+            format!(
+                "{}: phase margin {}, gain margin {}, peak of the sensitivity {:.2}",
+                found.object,
+                with(margins.phase_deg, "deg"),
+                with(margins.gain_db, "dB"),
+                margins.peak_sensitivity
+            )
+        }
+    }
+}
+
+/// A point of a curve: frequency [Hz], magnitude [dB] and phase [deg].
+type Point = [f64; 3];
+
+/// Returns the curve of a loop. Its phase has no jumps.
+fn curve(around: &Loop) -> Vec<Point> {
+    let ratio = HZ[1] / HZ[0];
+    let mut last = -90.0;
+    let point = |k: usize| {
+        let hz = HZ[0] * libm::pow(ratio, k as f64 / (POINTS - 1) as f64);
+        let point = point(hz, around.open(2.0 * PI * hz), last);
+        last = point[2];
+        point
+    };
+    (0..POINTS).map(point).collect()
+}
+
+fn point(hz: f64, open: Complex<f64>, near: f64) -> Point {
+    let phase = open.arg().to_degrees();
+    [hz, 20.0 * libm::log10(open.norm()), phase + 360.0 * ((near - phase) / 360.0).round()]
+}
+
+/// Returns the measured frequencies of a contact, with the gains of the picture. Each component that moves the feature
+/// was measured alone, with half of the gains of the graph.
+fn dots(feature: &TunedFeature, i: usize, curve: &[Point]) -> Vec<Point> {
+    let Some(first) = feature.answers[i].lines.first() else { return Vec::new() };
+    let scale = 2.0 * feature.new.map_or(1.0, |new| new[0] / feature.old[0]);
+    let all = |k: usize| feature.answers[i].lines.iter().filter_map(move |lines: &Vec<Line>| lines.get(k));
+    let is_coherent = |k: &usize| all(*k).all(|line| line.coherence >= fit::COHERENT);
+    let dot = |k: usize| {
+        let hz = first[k].omega / (2.0 * PI);
+        let open = all(k).map(|line| line.open).sum::<Complex<f64>>() * scale;
+        let far = |at: &&Point| (at[0] / hz).ln().abs();
+        let near = curve.iter().min_by(|a, b| far(a).total_cmp(&far(b))).map_or(-90.0, |at| at[2]);
+        point(hz, open, near)
+    };
+    (0..first.len()).filter(is_coherent).map(dot).collect()
+}
+
+/// Draws the curve and the dots of a contact, in each panel as far as its range goes.
+fn draw(
+    svg: &mut Svg,
+    i: usize,
+    hz: PlotAxis,
+    panels: [(PlotAxis, [f64; 2], usize); 2],
+    curve: &[Point],
+    dots: &[Point],
+) {
+    for (axis, [low, high], value) in panels {
+        let is_inside = |point: &&Point| (low..=high).contains(&point[value]);
+        let place = |point: &Point| [hz.at(point[0]), axis.at(point[value])];
+        styled(svg, i, |svg| svg.polyline(curve.iter().filter(is_inside).map(place)));
+        for [x, y] in dots.iter().filter(is_inside).map(place) {
+            svg.put(format_args!(
+                "<circle cx=\"{x:.1}\" cy=\"{y:.1}\" r=\"3.5\" fill=\"{}\"/>",
+                STYLES[i % STYLES.len()].0
+            ));
+        }
+    }
+}
+
+fn styled(svg: &mut Svg, i: usize, content: impl FnOnce(&mut Svg)) {
+    let (colour, dashes) = STYLES[i % STYLES.len()];
+    let attributes = format!("fill=\"none\" stroke=\"{colour}\" stroke-width=\"2\" stroke-dasharray=\"{dashes}\"");
+    svg.group(&attributes, content);
+}

@@ -1,0 +1,41 @@
+//! The end of a run: the sensor lifts off the object, so that the next run begins with a pad that nothing touches.
+
+use std::collections::BTreeSet;
+
+use serde_json::Value;
+use tactflow_runtime::graph::{Outline, OutlinedMode};
+
+/// The mode in which the sensor lifts off.
+pub(super) const MODE: &str = "tune_lift";
+/// How long it lifts off [s].
+pub(super) const LASTS_S: f64 = 2.0;
+/// How fast it lifts off [m/s].
+const SPEED: f64 = 0.015;
+
+/// Returns the settings that let a mode end after so long [s], whatever its exits `go` say, and lift the sensor off.
+/// Exits that fail, and those of a lost contact, stay.
+pub(super) fn settings(outline: &Outline, mode: &OutlinedMode, adder: &str, after_s: f64) -> Vec<String> {
+    let after_ms = (after_s * 1e3).ceil();
+    let mut exits = vec![format!("{{ to = \"{MODE}\", after_ms = {after_ms:?} }}")];
+    // The modes behind the exits stay reachable, by words that nobody sends.
+    exits.extend(targets(mode).iter().map(|to| format!("{{ to = {to:?}, on = \"{MODE}_{to}\" }}")));
+    let projectors = outline.nodes.iter().filter(|node| node.kind.text == "projector");
+    let free = projectors.map(|node| format!("modes.{MODE}.set.{}.select=[0, 0, 0, 0, 0, 0]", node.name));
+    let away = [
+        format!("modes.{}.go=[{}]", mode.name, exits.join(", ")),
+        format!("nodes.{MODE}_twist.type=twist_source"),
+        format!("nodes.{MODE}_twist.twist=[0, 0, 0, 0, 0, 0]"),
+        format!("nodes.{adder}.in.{MODE}={MODE}_twist.twist"),
+        format!("modes.{MODE}.set.{MODE}_twist.twist=[0, 0, {:?}, 0, 0, 0]", -SPEED),
+        format!("modes.{MODE}.done={{ after_ms = {:?} }}", LASTS_S * 1e3),
+    ];
+    away.into_iter().chain(free).collect()
+}
+
+/// Returns the modes to which the exits `go` of a mode lead.
+fn targets(mode: &OutlinedMode) -> BTreeSet<String> {
+    let exits = mode.settings.iter().filter(|setting| setting.path == "go");
+    let exits = exits.filter_map(|setting| serde_json::to_value(&setting.value).ok());
+    let exits = exits.flat_map(|exits| if let Value::Array(exits) = exits { exits } else { vec![exits] });
+    exits.filter_map(|exit| exit["to"].as_str().map(str::to_owned)).collect()
+}
