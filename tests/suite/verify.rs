@@ -155,9 +155,7 @@ fn values(scenario: &Scenario, trials: &[Trial], check: &str, figure: Figure) ->
 
 #[test]
 fn figures_of_the_truth_are_those_of_the_closed_form_whatever_the_seed() {
-    let scenario = Scenario::load(&catalogue(), &workspace().join(SLIDE)).unwrap_or_else(|report| {
-        panic!("{}", report.render(false));
-    });
+    let scenario = loaded(&workspace().join(SLIDE)).unwrap_or_else(|why| panic!("{why}"));
     let run = |seed| scenario.run(&catalogue(), seed, None, &|| false).expect("nobody interrupts it");
     let trials: Vec<Trial> = scenario.runs().into_iter().map(run).collect();
     // Ten samples of 2 exp(-t/tau), each 4 ms, have the mean of the last times a geometric sum.
@@ -181,7 +179,14 @@ fn written(files: &[(&str, &str)]) -> Result<Scenario, String> {
         fs::write(folder.path().join(name), text).unwrap();
     }
     let (name, _) = files[0];
-    Scenario::load(&catalogue(), &folder.path().join(name)).map_err(|report| report.render(false))
+    loaded(&folder.path().join(name))
+}
+
+/// Loads a scenario with one bench.
+fn loaded(path: &Path) -> Result<Scenario, String> {
+    let mut scenarios = Scenario::load(&catalogue(), path).map_err(|report| report.render(false))?;
+    assert_eq!(scenarios.len(), 1, "one bench");
+    Ok(scenarios.remove(0))
 }
 
 #[test]
@@ -221,8 +226,7 @@ fn a_run_may_be_done_early_but_samples_may_not_end_early() {
         fs::write(&graph, task).unwrap();
         let text = format!("[scenario]\ngraph = 'task.toml'\nfor_s = 2.0\n{asks}\n[check.x]\nof = 'truth.force'\n");
         fs::write(&scenario, text).unwrap();
-        let loaded =
-            Scenario::load(&catalogue(), &scenario).unwrap_or_else(|report| panic!("{}", report.render(false)));
+        let loaded = loaded(&scenario).unwrap_or_else(|why| panic!("{why}"));
         let trial = loaded.run(&catalogue(), None, None, &|| false).unwrap();
         let marks: Vec<Verdict> = loaded.rows(std::slice::from_ref(&trial)).iter().map(FigureRow::verdict).collect();
         (trial, marks)
@@ -382,6 +386,7 @@ fn what_cannot_vary_is_named_at_its_values() {
         (varied("{ devices.bench.friction = [0.1, inf] }", 9.0), "expected two numbers, the smaller one first"),
         (varied("[0.1, 1.0]", 9.0), "expected parameters of devices, each with its smallest and its largest value"),
         (varied("{ devices.bench.frction = [0.1, 1.0] }", 9.0), "`frction` is not a parameter here"),
+        (varied("{ devices.bench.frction = [0.1, 1.0] }", 9.0), "did you mean `friction`"),
         (varied("{ devices.bnch.friction = [0.1, 1.0] }", 9.0), "did you mean `bench`?"),
         (varied("{ devices.bench.friction = [-0.1, 1.0] }", 9.0), "expected a number, 0 or more [N m], found -0.1"),
         (varied("{ devices.bench.rows = [8, 16] }", 9.0), "a parameter that takes any number can vary"),
@@ -398,4 +403,41 @@ fn what_cannot_vary_is_named_at_its_values() {
         assert_eq!(said.code, 2, "{text}");
         assert!(said.err.contains(why) && said.err.contains("varied.toml:"), "{text}{}", said.err);
     }
+}
+
+#[test]
+fn a_scenario_runs_on_each_of_its_benches_and_names_them() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("both.toml");
+    let path = path.to_str().unwrap();
+    let benches = workspace().join("graphs/benches").display().to_string();
+    let on = |names: &[&str]| {
+        let names: Vec<String> = names.iter().map(|name| format!("'{benches}/{name}.toml'")).collect();
+        let list = format!("bench = [{}]", names.join(", "));
+        let text = varied("{ devices.bench.friction = [0.1, 1.0] }", 8.0);
+        text.replace(&format!("bench = '{benches}/ball.toml'"), &list)
+    };
+    fs::write(path, on(&["ball", "pen"])).unwrap();
+    let records = folder.path().join("records");
+    let said = say(&["verify", path, "--seeds", "2", "--json", "--out", records.to_str().unwrap()]);
+    assert_eq!(said.code, 0, "{}{}", said.out, said.err);
+    let found: serde_json::Value = serde_json::from_str(&said.out).unwrap();
+    let scenarios = found["scenarios"].as_array().unwrap();
+    let names: Vec<&str> = scenarios.iter().map(|scenario| scenario["name"].as_str().unwrap()).collect();
+    assert_eq!(names, ["both on ball", "both on pen"]);
+    let force = |i: usize| scenarios[i]["rows"][0]["values"][0].as_f64().unwrap();
+    assert!((force(0) - force(1)).abs() > 0.1, "a ball and a pen have different forces");
+    for file in ["both_on_ball-1.csv", "both_on_ball-2.csv", "both_on_pen-1.csv", "both_on_pen-2.csv"] {
+        assert!(records.join(file).exists(), "{file}");
+    }
+    let checked = say(&["check", path]);
+    assert!(checked.out.contains("a scenario of 6 runs on 2 benches, 3 s each"), "{}", checked.out);
+    // A mistake of one bench is shown once, and at its place.
+    fs::write(path, on(&["ball", "pin"])).unwrap();
+    let said = say(&["verify", path]);
+    assert_eq!((said.code, said.err.matches("error[").count()), (2, 1), "{}", said.err);
+    assert!(said.err.contains("pin.toml") && said.err.contains("both.toml:3:"), "{}", said.err);
+    fs::write(path, on(&[])).unwrap();
+    let said = say(&["verify", path]);
+    assert!(said.err.contains("expected the path of a bench, or a list of such paths"), "{}", said.err);
 }

@@ -52,7 +52,7 @@ fn a_check_of_a_scenario_reads_a_port() {
     let scenario = folder.path().join("scenario.toml");
     fs::write(&scenario, "[scenario]\ngraph = \"task.toml\"\nfor_s = 1.0\nnever_lost = \"firm.present\"\n").unwrap();
     let loaded = Scenario::load(&catalogue(), &scenario).unwrap_or_else(|report| panic!("{}", report.render(false)));
-    let report = loaded.warnings().expect("nothing reads `narrow`");
+    let report = loaded[0].warnings().expect("nothing reads `narrow`");
     let messages: Vec<&str> = report.diagnostics.iter().map(|warning| warning.message.as_str()).collect();
     assert_eq!(messages, ["no output of `narrow` is used"]);
 }

@@ -4,7 +4,7 @@ use tactflow_runtime::node::{At, FilePath, Mistake, Mistakes, Param};
 use tactflow_runtime::signal::JointsShape;
 use tactflow_runtime::source::Code;
 
-use super::joints::{JointDynamics, MAX_STRAIN, SimArm};
+use super::joints::{ArmLoad, JointDynamics, MAX_STRAIN, SimArm};
 use super::steps::is_resolved;
 use crate::arm::chain::Chain;
 use crate::arm::model::load;
@@ -50,6 +50,12 @@ pub struct ArmBody {
     /// Dry friction of the joints.
     #[param(unit = "N m", range = 0.0.., default = 0.1)]
     pub friction: f64,
+    /// Mass at the sensor that couples the joints, such as a heavy tool.
+    #[param(unit = "kg", range = 0.0.., default = 0.0)]
+    pub load: f64,
+    /// Mass at the sensor whose weight the controller does not compensate; negative if it compensates too much.
+    #[param(unit = "kg", default = 0.0)]
+    pub gravity_error: f64,
     /// Largest acceleration that an arm states for each joint.
     #[param(unit = "rad/s2", above = 0.0, default = 10.0)]
     pub acceleration: f64,
@@ -95,7 +101,8 @@ impl ArmModel {
             inertia,
             friction: self.body.friction,
         };
-        SimArm::new(loaded.chain, self.inertia().iter().copied().map(joint).collect(), loaded.start)
+        let arm = SimArm::new(loaded.chain, self.inertia().iter().copied().map(joint).collect(), loaded.start);
+        arm.with_load(ArmLoad { mass: self.body.load, uncompensated: self.body.gravity_error })
     }
 
     fn inertia(&self) -> &[f64] {

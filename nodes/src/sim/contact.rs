@@ -50,6 +50,11 @@ impl Wrench {
         self.force += force;
         self.moment += place.cross(force);
     }
+
+    /// Returns the same load with its moment about a point, for one about a point that is `from` there.
+    pub(super) fn about(self, from: Vec3) -> Self {
+        Self { moment: self.moment + from.cross(self.force), ..self }
+    }
 }
 
 /// The foam of the pad in contact with objects.
@@ -180,8 +185,9 @@ impl Contact {
         Vec2::new(self.xs[col], self.ys[row])
     }
 
-    /// Advances by `dt` [s]. Writes to `loads` the force on each object, in the base [N].
-    pub fn step(&mut self, dt: f64, pad: &BodyMotion, objects: &[Object], loads: &mut [Vec3]) {
+    /// Advances by `dt` [s]. Writes to `loads` the force on each object and its moment about the origin of the pad, in the
+    /// base.
+    pub fn step(&mut self, dt: f64, pad: &BodyMotion, objects: &[Object], loads: &mut [Wrench]) {
         for touch in self.touching.drain(..) {
             self.slots[touch.point[0] * self.xs.len() + touch.point[1]] = NO_SLOT;
         }
@@ -194,14 +200,15 @@ impl Contact {
         if !self.touching.is_sorted_by_key(|touch| touch.point) {
             self.touching.sort_unstable_by_key(|touch| touch.point);
         }
-        loads.fill(Vec3::ZERO);
+        loads.fill(Wrench::default());
         let mut wrench = Wrench::default();
         self.press(objects, &mut wrench, loads);
         self.rub(dt, &mut wrench, loads);
         // From the frame of the pad to the base.
         let turn = pad.pose.rotation;
-        self.wrench = Wrench { force: turn * wrench.force, moment: turn * wrench.moment };
-        loads.iter_mut().for_each(|load| *load = turn * *load);
+        let in_base = |wrench: Wrench| Wrench { force: turn * wrench.force, moment: turn * wrench.moment };
+        self.wrench = in_base(wrench);
+        loads.iter_mut().for_each(|load| *load = in_base(*load));
     }
 
     /// Finds the points that touch an object.
@@ -256,7 +263,7 @@ impl Contact {
     }
 
     /// Adds the forces of the columns, in the pad's frame.
-    fn press(&mut self, objects: &[Object], wrench: &mut Wrench, loads: &mut [Vec3]) {
+    fn press(&mut self, objects: &[Object], wrench: &mut Wrench, loads: &mut [Wrench]) {
         let parts = self.parts();
         self.tactels.iter_mut().for_each(|tactel| tactel.normal = 0.0);
         for touch in &mut self.touching {
@@ -266,7 +273,7 @@ impl Contact {
             touch.force = self.column.force(touch.depth, rate, objects[touch.object].softness * parts);
             let push = touch.normal * (touch.force / facing);
             wrench.push(place, push);
-            loads[touch.object] -= push;
+            loads[touch.object].push(place, -push);
             let tactel = &mut self.tactels[touch.tactel];
             tactel.normal += touch.force;
             tactel.object = touch.object;
@@ -280,7 +287,7 @@ impl Contact {
     }
 
     /// Adds the forces of the bristles, in the pad's frame.
-    fn rub(&mut self, dt: f64, wrench: &mut Wrench, loads: &mut [Vec3]) {
+    fn rub(&mut self, dt: f64, wrench: &mut Wrench, loads: &mut [Wrench]) {
         let cols = self.shape.cols;
         for (index, tactel) in self.tactels.iter_mut().enumerate() {
             if tactel.normal == 0.0 {
@@ -292,7 +299,7 @@ impl Contact {
             tactel.rub(dt, slide.truncate(), [self.shear, self.shear_damping], &self.foam);
             let push = tactel.friction.extend(0.0);
             wrench.push(place, push);
-            loads[tactel.object] -= push;
+            loads[tactel.object].push(place, -push);
         }
     }
 

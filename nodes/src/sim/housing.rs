@@ -44,7 +44,7 @@ impl Housing {
 
     /// Adds the forces of its contacts to the wrench on the pad about its origin, and to those on the objects, in the
     /// base.
-    pub(super) fn press(&self, pad: &BodyMotion, objects: &[Object], wrench: &mut Wrench, loads: &mut [Vec3]) {
+    pub(super) fn press(&self, pad: &BodyMotion, objects: &[Object], wrench: &mut Wrench, loads: &mut [Wrench]) {
         for (object, load) in objects.iter().zip(loads) {
             let touch = |i: usize| {
                 let part = i as f64 / (POINTS - 1) as f64;
@@ -58,7 +58,7 @@ impl Housing {
             let velocity = pad.linear + pad.angular.cross(place) - object.velocity_at(place + pad.pose.translation);
             let force = normal * (self.stiffness * (depth - DAMPING_S * velocity.dot(normal))).max(0.0);
             wrench.push(place, force);
-            *load -= force;
+            load.push(place, -force);
         }
     }
 }
@@ -81,12 +81,12 @@ mod tests {
         let turn = parry3d_f64::math::Rot3::from_xyzw(0.0, (angle / 2.0).sin(), 0.0, (angle / 2.0).cos());
         let pose = Pose3::from_parts(Vec3::ZERO, turn);
         let still = BodyMotion { pose, linear: Vec3::ZERO, angular: Vec3::ZERO };
-        let (mut wrench, mut loads) = (Wrench::default(), [Vec3::ZERO]);
+        let (mut wrench, mut loads) = (Wrench::default(), [Wrench::default()]);
         housing.press(&still, std::slice::from_ref(&plane), &mut wrench, &mut loads);
         let depth = 0.02 + 0.1 * 0.01_f64.sin() - 0.019;
         assert!((wrench.force - Vec3::new(0.0, 0.0, -1e4 * depth)).length() < 1e-6, "{wrench:?}");
         assert!((wrench.moment.y - 1e4 * depth * 0.1 * 0.01_f64.cos()).abs() < 1e-6, "{wrench:?}");
-        assert!((loads[0] + wrench.force).length() < 1e-12);
+        assert!((loads[0].force + wrench.force).length() < 1e-12 && (loads[0].moment + wrench.moment).length() < 1e-12);
         let away = BodyMotion { linear: Vec3::new(0.0, 0.0, -5.0), ..still };
         let mut none = Wrench::default();
         housing.press(&away, &[plane], &mut none, &mut loads);

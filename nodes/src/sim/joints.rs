@@ -4,14 +4,15 @@
 //! velocity:
 //!
 //! ```text
-//! I q'' = K (q_eq - q) - 2 zeta sqrt(K I) q' - friction + J^T w
+//! (I + m L^T L) q'' = K (q_eq - q) - 2 zeta sqrt(K I) q' - friction + J^T w
 //! ```
 //!
 //! with J the spatial Jacobian and w the wrench on the pad about the origin of the base. Damping is a ratio. Friction
-//! is a bristle that slips at the friction torque. Not simulated: gravity (the controller compensates it), coupling of
-//! the joint inertias, Coriolis forces, elasticity of the gears and delay of the bus.
+//! is a bristle that slips at the friction torque. L is the Jacobian of the origin of the sensor: a mass m there couples
+//! the joints. The controller compensates gravity, up to a mass that it does not know. Not simulated: coupling by the
+//! masses of the links, Coriolis forces, elasticity of the gears and delay of the bus.
 
-use nalgebra::Vector6;
+use nalgebra::{Matrix3, Vector3, Vector6};
 use parry3d_f64::math::Vec3;
 use tactflow_runtime::signal::{Pose, Twist};
 
@@ -42,9 +43,24 @@ pub struct SimArm {
     speed: Vec<f64>,
     /// Strain of the friction bristle of each joint [rad].
     strain: Vec<f64>,
+    load: ArmLoad,
+    /// Acceleration of each joint [rad/s²].
+    acceleration: Vec<f64>,
     /// Pose of the sensor in the base.
     pub(super) pose: Pose,
 }
+
+/// What an arm carries beside its links, at the origin of the sensor.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct ArmLoad {
+    /// Mass that couples the joints [kg].
+    pub mass: f64,
+    /// Mass whose weight the controller does not compensate [kg].
+    pub uncompensated: f64,
+}
+
+/// Acceleration by gravity [m/s²].
+const GRAVITY: f64 = 9.81;
 
 /// Strain at which friction slips [rad].
 pub(super) const MAX_STRAIN: f64 = 2e-4;
@@ -63,9 +79,36 @@ impl SimArm {
             position: start.clone(),
             equilibrium: start,
             speed: zeros.clone(),
+            acceleration: zeros.clone(),
             strain: zeros,
+            load: ArmLoad::default(),
             pose,
         }
+    }
+
+    /// Returns the same arm with a load. It begins at rest where it is: its springs bear the weight.
+    #[must_use]
+    pub fn with_load(mut self, load: ArmLoad) -> Self {
+        self.load = load;
+        if load.uncompensated != 0.0 {
+            let weight = self.about_base(&self.weight());
+            let sag = |(column, joint): (&Twist, &JointDynamics)| column.0.dot(&weight) / joint.stiffness;
+            let sags = self.columns.iter().zip(&self.joints).map(sag);
+            self.equilibrium.iter_mut().zip(sags).for_each(|(equilibrium, sag)| *equilibrium -= sag);
+        }
+        self
+    }
+
+    /// Returns the weight that the controller does not compensate.
+    fn weight(&self) -> Wrench {
+        Wrench { force: Vec3::new(0.0, 0.0, -GRAVITY * self.load.uncompensated), moment: Vec3::ZERO }
+    }
+
+    /// Returns a wrench about the origin of the sensor as one about the origin of the base.
+    fn about_base(&self, wrench: &Wrench) -> Vector6<f64> {
+        let place = Vec3::from(<[f64; 3]>::from(self.pose.0.translation.vector));
+        let (force, moment) = (wrench.force, wrench.moment + place.cross(wrench.force));
+        Vector6::new(force.x, force.y, force.z, moment.x, moment.y, moment.z)
     }
 
     /// Returns pose and velocity of the sensor in the base.
@@ -82,10 +125,10 @@ impl SimArm {
     /// Advances by `dt` [s] with the equilibrium moving at `velocity` [rad/s], under a wrench about the origin of the
     /// sensor.
     pub fn step(&mut self, dt: f64, velocity: &[f64], wrench: &Wrench) {
-        let place = Vec3::from(<[f64; 3]>::from(self.pose.0.translation.vector));
-        let moment = wrench.moment + place.cross(wrench.force);
-        let force = wrench.force;
-        let about_base = Vector6::new(force.x, force.y, force.z, moment.x, moment.y, moment.z);
+        let mut about_base = self.about_base(wrench);
+        if self.load.uncompensated != 0.0 {
+            about_base += self.about_base(&self.weight());
+        }
         for (i, joint) in self.joints.iter().enumerate() {
             self.equilibrium[i] += velocity[i] * dt;
             let contact = self.columns[i].0.dot(&about_base);
@@ -94,8 +137,14 @@ impl SimArm {
             self.strain[i] = (self.strain[i] + self.speed[i] * dt).clamp(-MAX_STRAIN, MAX_STRAIN);
             let friction = joint.friction * self.strain[i] / MAX_STRAIN;
             let torque = spring - damping * self.speed[i] - friction + contact;
+            self.acceleration[i] = torque / joint.inertia;
+        }
+        if self.load.mass > 0.0 {
+            self.couple();
+        }
+        for i in 0..self.joints.len() {
             // Semi-implicit Euler, speed before position: a spring gains no energy.
-            self.speed[i] += torque / joint.inertia * dt;
+            self.speed[i] += self.acceleration[i] * dt;
             let limits = &self.chain.joints()[i];
             let next = self.position[i] + self.speed[i] * dt;
             self.position[i] = next.clamp(limits.lower, limits.upper);
@@ -104,6 +153,26 @@ impl SimArm {
             }
         }
         self.pose = self.chain.forward(&self.position, &mut self.columns);
+    }
+
+    /// Turns the accelerations of uncoupled joints, a = I⁻¹ τ, into those with the mass m at the sensor, by the matrix
+    /// inversion lemma: (I + m Lᵀ L)⁻¹ τ = a - I⁻¹ Lᵀ (1/m + L I⁻¹ Lᵀ)⁻¹ L a.
+    fn couple(&mut self) {
+        let place = self.pose.0.translation.vector;
+        // The velocity of the origin of the sensor, by each joint.
+        let linear = |column: &Twist| column.0.fixed_rows::<3>(0) + column.0.fixed_rows::<3>(3).cross(&place);
+        let mut inverse = Matrix3::from_diagonal_element(1.0 / self.load.mass);
+        let mut free = Vector3::zeros();
+        for (i, column) in self.columns.iter().enumerate() {
+            let l = linear(column);
+            inverse += l * l.transpose() / self.joints[i].inertia;
+            free += l * self.acceleration[i];
+        }
+        // It is positive definite: a positive diagonal and a sum of squares.
+        let Some(force) = inverse.cholesky().map(|inverse| inverse.solve(&free)) else { return };
+        for (i, column) in self.columns.iter().enumerate() {
+            self.acceleration[i] -= linear(column).dot(&force) / self.joints[i].inertia;
+        }
     }
 
     /// Returns the smallest joint velocities that move the sensor without rotation at `velocity` in the base [rad/s].
@@ -124,6 +193,7 @@ impl SimArm {
             let friction = joint.friction / MAX_STRAIN * self.strain[i] * self.strain[i];
             (joint.inertia * self.speed[i] * self.speed[i] + joint.stiffness * off * off + friction) / 2.0
         };
-        (0..self.joints.len()).map(energy).sum()
+        let speed = self.motion().linear.length_squared();
+        (0..self.joints.len()).map(energy).sum::<f64>() + self.load.mass * speed / 2.0
     }
 }

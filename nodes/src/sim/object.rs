@@ -5,6 +5,7 @@ use parry3d_f64::shape::{Ball, Cuboid};
 use tactflow_runtime::node::Param;
 use tactflow_runtime::signal::Pose;
 
+use super::contact::Wrench;
 use super::shape::{Geometry, pose3};
 use crate::motion::pose::pose_of;
 use crate::usual::{USUAL_RAD, USUAL_REACH_M};
@@ -58,6 +59,12 @@ pub struct ObjectParams {
     /// Mass, used with a `mount`; the damping of the mount is half of the critical one.
     #[param(unit = "kg", above = 0.0, default = 1.0)]
     pub(crate) mass: f64,
+    /// Stiffness of its mount against a rotation about its centre; it does not turn under a load if not given.
+    #[param(unit = "N m/rad", above = 0.0)]
+    pub(crate) turn_mount: Option<f64>,
+    /// Moment of inertia about every axis, used with a `turn_mount`; its damping is half of the critical one.
+    #[param(unit = "kg m2", above = 0.0, default = 0.001)]
+    pub(crate) inertia: f64,
     /// Largest random offset of its position along the sensor's x and y; it depends on the seed.
     #[param(unit = "m", range = 0.0.., default = 0.0)]
     pub(crate) scatter: f64,
@@ -108,6 +115,11 @@ pub struct Object {
     /// Deflection of the mount [m].
     pub(super) sag: Vec3,
     sag_speed: Vec3,
+    /// Stiffness of the mount against a rotation [N m/rad] and moment of inertia [kg m²].
+    turn_mount: Option<(f64, f64)>,
+    /// Rotation of the mount in the base, as its axis times its angle [rad].
+    pub(super) tilt: Vec3,
+    tilt_speed: Vec3,
     pub(super) pose: Pose3,
     velocity: Vec3,
     /// Angular velocity in the base [rad/s].
@@ -137,6 +149,7 @@ impl Object {
             script: params.motion.iter().map(in_base).collect(),
             axis: start.rotation * Vec3::Z,
             mount: params.mount.map(|stiffness| (stiffness, params.mass)),
+            turn_mount: params.turn_mount.map(|stiffness| (stiffness, params.inertia)),
             ..Self::free(shape, softness, home)
         })
     }
@@ -157,6 +170,9 @@ impl Object {
             mount: None,
             sag: Vec3::ZERO,
             sag_speed: Vec3::ZERO,
+            turn_mount: None,
+            tilt: Vec3::ZERO,
+            tilt_speed: Vec3::ZERO,
             pose,
             velocity: Vec3::ZERO,
             spin: Vec3::ZERO,
@@ -174,13 +190,10 @@ impl Object {
         (self.drift, self.softness, self.is_gone) = (velocity, self.own_softness / stiffness, is_gone);
     }
 
-    /// Advances by `dt` [s] to `time` [s] under the `force` of the pad [N].
-    pub fn step(&mut self, time: f64, dt: f64, force: Vec3) {
-        if let Some((stiffness, mass)) = self.mount {
-            let damping = 2.0 * MOUNT_DAMPING * (stiffness * mass).sqrt();
-            self.sag_speed += (force - self.sag * stiffness - self.sag_speed * damping) / mass * dt;
-            self.sag += self.sag_speed * dt;
-        }
+    /// Advances by `dt` [s] to `time` [s] under a load, with its moment about the centre of the object.
+    pub fn step(&mut self, time: f64, dt: f64, load: &Wrench) {
+        give_way(self.mount, [&mut self.sag, &mut self.sag_speed], load.force, dt);
+        give_way(self.turn_mount, [&mut self.tilt, &mut self.tilt_speed], load.moment, dt);
         self.home.translation += self.drift * dt;
         let (mut position, mut velocity) = (self.home.translation + self.sag, self.sag_speed + self.drift);
         let (mut angle, mut spin) = (0.0, 0.0);
@@ -195,8 +208,11 @@ impl Object {
         }
         let (sin, cos) = libm::sincos(angle / 2.0);
         let turned = Rot3::from_xyzw(self.axis.x * sin, self.axis.y * sin, self.axis.z * sin, cos);
-        self.pose = Pose3::from_parts(position, turned * self.home.rotation);
-        (self.velocity, self.spin) = (velocity, self.axis * spin);
+        let turned = turned * self.home.rotation;
+        let tilted = if self.turn_mount.is_some() { Rot3::from_scaled_axis(self.tilt) * turned } else { turned };
+        self.pose = Pose3::from_parts(position, tilted);
+        // The tilt is small, so the rate of its rotation vector is its angular velocity.
+        (self.velocity, self.spin) = (velocity, self.axis * spin + self.tilt_speed);
     }
 
     /// Returns its velocity at a point in the base [m/s].
@@ -214,11 +230,20 @@ impl Object {
     /// Returns the energy of the mount and of the mass on it [J].
     #[cfg(test)]
     pub(super) fn energy(&self) -> f64 {
-        let energy = |(stiffness, mass): (f64, f64)| {
-            stiffness * self.sag.length_squared() + mass * self.sag_speed.length_squared()
+        let energy = |mount: Option<(f64, f64)>, way: Vec3, speed: Vec3| {
+            let energy = |(spring, mass)| spring * way.length_squared() + mass * speed.length_squared();
+            mount.map_or(0.0, energy) / 2.0
         };
-        self.mount.map_or(0.0, energy) / 2.0
+        energy(self.mount, self.sag, self.sag_speed) + energy(self.turn_mount, self.tilt, self.tilt_speed)
     }
+}
+
+/// Advances a damped spring with a mass on it by `dt` [s] under a load.
+fn give_way(mount: Option<(f64, f64)>, [way, speed]: [&mut Vec3; 2], load: Vec3, dt: f64) {
+    let Some((stiffness, mass)) = mount else { return };
+    let damping = 2.0 * MOUNT_DAMPING * (stiffness * mass).sqrt();
+    *speed += (load - *way * stiffness - *speed * damping) / mass * dt;
+    *way += *speed * dt;
 }
 
 /// Returns a value that goes from 0 to 1 for t from 0 to 1 without a jump of its slope, and the slope.

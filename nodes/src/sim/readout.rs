@@ -25,6 +25,9 @@ pub struct Electronics {
     /// Standard deviation of the logarithm of the tactels' sensitivity.
     #[param(unit = "1", range = 0.0.., default = 0.22)]
     pub(crate) spread: f64,
+    /// Standard deviation of the logarithm of the change of the tactels' sensitivity since their calibration.
+    #[param(unit = "1", range = 0.0.., default = 0.0)]
+    pub(crate) gain_error: f64,
     /// Difference of the reading between falling and rising force, as a fraction of the force.
     #[param(unit = "1", range = 0.0..=1.0, default = 0.06)]
     pub(crate) hysteresis: f64,
@@ -73,12 +76,14 @@ impl Readout {
     #[must_use]
     pub fn new(tactels: usize, electronics: Electronics, seed: u64) -> Self {
         let mut random = Random::new(electronics.serial, 1);
+        let mut aged = Random::new(electronics.serial, 4);
         let tactel = |_| {
             let sensitivity = libm::exp(random.normal() * electronics.spread);
             let width = libm::exp(random.normal() * electronics.spread / 4.0);
+            let age = libm::exp(aged.normal() * electronics.gain_error);
             TactelState {
                 offset: random.uniform(0.05, 0.10) * electronics.range,
-                range: (electronics.range * sensitivity * width).min(0.88 * MAX_COUNT),
+                range: (electronics.range * sensitivity * width).min(0.88 * MAX_COUNT) * age,
                 squash: electronics.squash * width,
                 force: 0.0,
                 branch: 0.0,
@@ -206,6 +211,23 @@ mod tests {
         assert!((std(&means) / answer / 0.036 - 1.0).abs() < 0.06, "{}", std(&means) / answer);
         let own: Vec<f64> = frames.iter().zip(&means).map(|(f, mean)| f64::from(f[7]) - mean).collect();
         assert!((std(&own) / 3.0 - 1.0).abs() < 0.06, "{}", std(&own));
+    }
+
+    #[test]
+    fn sensitivities_change_by_the_gain_error_and_the_zeros_stay() {
+        let read = |gain_error: f64, force: f64| {
+            let electronics =
+                Electronics { gain_error, common_noise: 0.0, own_noise: 0.0, creep: 0.0, ..Electronics::default() };
+            let mut counts = vec![0.0; 1024];
+            Readout::new(1024, electronics, 1).read(0.004, &[force; 1024], &mut counts);
+            counts
+        };
+        let zeros = read(0.0, 0.0);
+        assert_eq!(zeros, read(0.1, 0.0));
+        let (before, after) = (read(0.0, 1.0), read(0.1, 1.0));
+        let change = |i: usize| f64::from((after[i] - zeros[i]) / (before[i] - zeros[i])).ln();
+        let square = (0..1024).map(|i| change(i) * change(i)).sum::<f64>() / 1024.0;
+        assert!((square.sqrt() / 0.1 - 1.0).abs() < 0.07, "{}", square.sqrt());
     }
 
     #[test]

@@ -15,6 +15,8 @@ pub(super) fn thing(shape: ShapeKind, at: [f64; 3]) -> ObjectParams {
         stiffness: None,
         mount: None,
         mass: 1.0,
+        turn_mount: None,
+        inertia: 0.001,
         scatter: 0.0,
         motion: vec![],
     }

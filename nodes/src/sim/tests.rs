@@ -5,10 +5,10 @@ use parry3d_f64::math::{Pose3, Vec3};
 use tactflow_runtime::device::Disturbance;
 use tactflow_runtime::signal::{ImageShape, Joint as Limits, Unit};
 
-use super::contact::{BodyMotion, Contact};
+use super::contact::{BodyMotion, Contact, Wrench};
 use super::foam::Foam;
 use super::imprint::Imprint;
-use super::joints::{JointDynamics, SimArm};
+use super::joints::{ArmLoad, JointDynamics, SimArm};
 use super::object::{Object, ObjectParams, ScriptedMove, ShapeKind};
 use super::steps::is_resolved;
 use super::testing::{ball, thing};
@@ -120,7 +120,7 @@ fn the_contact_of_a_ball_has_the_area_and_force_of_the_closed_form() {
         for depth in [0.0005, 0.001, 0.002] {
             let object = object(&ball(radius, [0.0007, -0.0011, radius]));
             let mut contact = Contact::new(shape(), lossless(), 0.001, 8);
-            contact.step(0.001, &pad(depth), &[object], &mut [Vec3::ZERO]);
+            contact.step(0.001, &pad(depth), &[object], &mut [Wrench::default()]);
             // a² = 2 R d - d², and the force is the foundation's modulus times the volume of the cap.
             let area = std::f64::consts::PI * (2.0 * radius * depth - depth * depth);
             let volume = std::f64::consts::PI * depth * depth * (radius - depth / 3.0);
@@ -145,6 +145,7 @@ fn energy_does_not_grow() {
         (slide(undamped), lossless(), soft.clone(), true),
         (slide(undamped), Foam::default(), soft, false),
         (lwr(0.0, 0.0), lossless(), tilted.clone(), true),
+        (lwr(0.0, 0.0).with_load(ArmLoad { mass: 1.5, uncompensated: 0.0 }), lossless(), tilted.clone(), true),
         (lwr(0.2, 0.1), Foam::default(), tilted, false),
     ];
     for (case, (arm, foam, thing, is_lossless)) in cases.into_iter().enumerate() {
@@ -166,6 +167,76 @@ fn energy_does_not_grow() {
         assert!(max < 1.01 * first, "case {case}: from {first} J to {max} J");
         assert_eq!(min > 0.98 * first, is_lossless, "case {case}: from {first} J to {min} J");
     }
+}
+
+#[test]
+fn a_load_slows_an_arm_and_hangs_from_its_springs() {
+    let joint = JointDynamics { stiffness: 5000.0, damping_ratio: 0.0, inertia: 2.0, friction: 0.0 };
+    let far = thing(ShapeKind::Plane, [0.0, 0.0, 0.5]);
+    // The weight of 0.4 kg lets the spring sag by m g / k, and the arm begins at rest there.
+    let hangs = slide(joint).with_load(ArmLoad { mass: 0.0, uncompensated: 0.4 });
+    let mut hanging = world(hangs, lossless(), std::slice::from_ref(&far), 0.0005);
+    hanging.advance(1.0, &[0.0]);
+    let (q, sag) = (hanging.arm.position[0], hanging.arm.equilibrium[0]);
+    assert!(q.abs() < 1e-12 && (sag - 0.4 * 9.81 / 5000.0).abs() < 1e-12, "{q} {sag}");
+    // A mass swings with the joint: half a period of √(k / (I + m)) after the spring was loaded, it is on the other side.
+    let swings = slide(joint).with_load(ArmLoad { mass: 1.5, uncompensated: 0.0 });
+    let mut swinging = world(swings, lossless(), &[far], 0.0001);
+    swinging.arm.equilibrium[0] += 0.01;
+    let half = std::f64::consts::PI / (5000.0_f64 / 3.5).sqrt();
+    swinging.advance(half, &[0.0]);
+    assert!((swinging.arm.position[0] - 0.02).abs() < 1e-5, "{}", swinging.arm.position[0]);
+}
+
+/// The acceleration of seven joints with a mass at the sensor, against the whole inertia matrix.
+#[test]
+fn a_load_couples_the_joints_as_the_inertia_matrix_says() {
+    let mut coupled = lwr(0.0, 0.0).with_load(ArmLoad { mass: 1.5, uncompensated: 0.0 });
+    let (step, inertia) = (1e-6, [2.0, 2.0, 1.0, 0.8, 0.3, 0.25, 0.1]);
+    let pull: Vec<f64> = (0..7).map(|i| 0.01 * f64::from(i - 3)).collect();
+    coupled.equilibrium.iter_mut().zip(&pull).for_each(|(equilibrium, by)| *equilibrium += by);
+    // The way of the sensor by each joint, as a finite difference of its place.
+    let place = |turned: Option<usize>| {
+        let mut arm = lwr(0.0, 0.0);
+        if let Some(i) = turned {
+            arm.equilibrium[i] += 1e-5;
+            arm.position[i] += 1e-5;
+        }
+        arm.step(0.0, &[0.0; 7], &Wrench::default());
+        arm.motion().pose.translation
+    };
+    let way = |i: usize| (place(Some(i)) - place(None)) / 1e-5;
+    let ways: Vec<Vector3<f64>> = (0..7).map(|i| Vector3::from(<[f64; 3]>::from(way(i)))).collect();
+    let matrix =
+        nalgebra::DMatrix::from_fn(7, 7, |i, j| 1.5 * ways[i].dot(&ways[j]) + if i == j { inertia[i] } else { 0.0 });
+    let torque = nalgebra::DVector::from_iterator(7, pull.iter().map(|by| 200.0 * by));
+    let wanted = matrix.lu().solve(&torque).expect("an inertia matrix is regular");
+    let start = coupled.position.clone();
+    coupled.step(step, &[0.0; 7], &Wrench::default());
+    for i in 0..7 {
+        let found = (coupled.position[i] - start[i]) / (step * step);
+        assert!((found - wanted[i]).abs() < 1e-3 * wanted.norm(), "joint {i}: {found} and not {}", wanted[i]);
+    }
+}
+
+#[test]
+fn an_object_on_a_turning_mount_tilts_by_the_moment_over_its_stiffness() {
+    // A box that the pad meets 30 mm beside its centre, where the pad ends and the box goes on.
+    let turning = ObjectParams {
+        size: Some([0.2, 0.2, 0.02]),
+        turn_mount: Some(40.0),
+        ..thing(ShapeKind::Box, [0.07, 0.0, 0.012])
+    };
+    let joint = JointDynamics { stiffness: 5000.0, damping_ratio: 1.0, inertia: 2.0, friction: 0.0 };
+    let mut world = world(slide(joint), lossless(), &[turning], 0.0005);
+    world.advance(1.0, &[0.004]);
+    world.advance(4.0, &[0.0]);
+    let (force, middle) = (world.truth(0.015).force, world.truth(0.015).middle.expect("it touches"));
+    let tilt = world.objects[0].tilt;
+    // The force of the pad pushes along z, on the side of negative x of the box.
+    let wanted = force * (0.07 - middle.x) / 40.0;
+    assert!(force > 3.0 && (tilt.y / wanted - 1.0).abs() < 0.03, "{tilt} under {force} N at {}", middle.x);
+    assert!(tilt.x.abs() < 0.02 * tilt.y.abs(), "{tilt}");
 }
 
 #[test]
@@ -203,7 +274,7 @@ fn friction_stays_in_its_cone_and_sticks_and_slips() {
     for step in 0..4000 {
         let speed = if step < 2000 { 2e-4 } else { 0.02 };
         let moving = BodyMotion { linear: Vec3::new(0.6, 0.8, 0.0) * speed, ..pad(0.001) };
-        contact.step(0.001, &moving, &objects, &mut [Vec3::ZERO]);
+        contact.step(0.001, &moving, &objects, &mut [Wrench::default()]);
         slid += speed * 0.001;
         let [x, y] = contact.friction().to_array();
         let friction = x.hypot(y);
@@ -228,7 +299,7 @@ fn the_imprint_keeps_the_sum_and_the_centre_of_a_load() {
     for (x, y) in [(0.0, 0.0), (0.0123, -0.0087), (0.038, 0.0), (-0.0385, 0.0385)] {
         let objects = [object(&ball(0.003, [x, y, 0.003]))];
         let mut contact = Contact::new(shape(), Foam::default(), 0.001, 8);
-        contact.step(0.001, &pad(0.002), &objects, &mut [Vec3::ZERO]);
+        contact.step(0.001, &pad(0.002), &objects, &mut [Wrench::default()]);
         imprint.take(&contact.touching);
         let clean = &imprint.forces;
         let sum: f64 = clean.iter().sum();
@@ -250,7 +321,7 @@ fn objects_move_smoothly_along_their_script() {
     let mark = Vec3::new(0.03, 0.0, 0.01);
     let mut last = object.pose.transform_point(mark);
     for step in 1..=3000 {
-        object.step(f64::from(step) * 0.001, 0.001, Vec3::ZERO);
+        object.step(f64::from(step) * 0.001, 0.001, &Wrench::default());
         let now = object.pose.transform_point(mark);
         let velocity = object.velocity_at(now);
         assert!(velocity.distance((now - last) / 0.001) < 5e-4, "its velocity is the derivative of its position");
@@ -266,7 +337,7 @@ fn a_steady_motion_has_one_speed() {
     let motion = vec![ScriptedMove { from_s: 1.0, to_s: 5.0, by: [0.0, 0.02, 0.0], turn: 0.4, steady: true }];
     let mut object = object(&ObjectParams { motion, ..ball(0.04, [0.0, 0.0, 0.05]) });
     for (time, part) in [(0.5, 0.0), (2.0, 0.25), (3.0, 0.5), (4.9, 0.975), (6.0, 1.0)] {
-        object.step(time, 0.001, Vec3::ZERO);
+        object.step(time, 0.001, &Wrench::default());
         let mark = object.pose.transform_point(Vec3::new(0.03, 0.0, 0.0));
         let angle: f64 = 0.4 * part;
         let wanted = Vec3::new(0.03 * angle.cos(), 0.02 * part + 0.03 * angle.sin(), 0.05);

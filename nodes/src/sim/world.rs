@@ -26,8 +26,8 @@ pub struct World {
     axes: Rot3,
     /// Force of a hand on the sensor, in the base [N].
     push: Vec3,
-    /// Force on each object [N].
-    loads: Vec<Vec3>,
+    /// Force on each object, and its moment about the centre of the object, in the base.
+    loads: Vec<Wrench>,
     /// Simulated time [s].
     time: f64,
     /// Longest step [s].
@@ -45,7 +45,7 @@ impl World {
         let spread = foam.spread;
         let contact = Contact::new(shape.clone(), foam, apart, objects.len());
         let imprint = Imprint::new(&shape, contact.fine, spread);
-        let loads = vec![Vec3::ZERO; objects.len()];
+        let loads = vec![Wrench::default(); objects.len()];
         let from = arm.motion().pose;
         let survey = objects.iter().enumerate().find_map(|(i, object)| Some((i, Survey::new(object, from)?)));
         Self {
@@ -88,13 +88,16 @@ impl World {
         for step in 1..=steps as u64 {
             let now = begin + dt * step as f64;
             for (object, load) in self.objects.iter_mut().zip(&self.loads) {
-                object.step(now, dt, *load);
+                object.step(now, dt, load);
             }
             let pad = self.arm.motion();
             self.contact.step(dt, &pad, &self.objects, &mut self.loads);
             self.wrench = self.contact.wrench;
             if let Some(housing) = &self.housing {
                 housing.press(&pad, &self.objects, &mut self.wrench, &mut self.loads);
+            }
+            for (object, load) in self.objects.iter().zip(&mut self.loads) {
+                *load = load.about(pad.pose.translation - object.pose.translation);
             }
             self.wrench.force += self.push;
             self.arm.step(dt, velocity, &self.wrench);
@@ -115,7 +118,8 @@ impl World {
     #[must_use]
     pub fn is_sound(&self) -> bool {
         let is_near = |place: Vec3| place.is_finite() && place.length() < 1e3;
-        is_near(self.arm.motion().pose.translation) && self.objects.iter().all(|object| is_near(object.sag))
+        is_near(self.arm.motion().pose.translation)
+            && self.objects.iter().all(|object| is_near(object.sag) && is_near(object.tilt))
     }
 
     /// Returns the noise-free image [N].

@@ -98,10 +98,12 @@ fn allowed_json<S: Serializer>(allowed: &[AllowedWarning], serializer: S) -> Res
 /// Checks a scenario with its graph and its bench.
 fn check_scenario(path: &Path, args: &CheckArgs, shell: &Shell) -> Checked {
     match Scenario::load(shell.catalogue(), path) {
-        Ok(scenario) => {
-            let (runs, length) = (count_of(scenario.runs().len(), "run"), scenario.for_s);
-            let summary = format!("a scenario of {runs}, {length} s each; run it with `tactflow verify`");
-            let report = scenario.warnings().cloned();
+        Ok(scenarios) => {
+            let length = scenarios.first().map_or(0.0, |scenario| scenario.for_s);
+            let runs = count_of(scenarios.iter().map(|scenario| scenario.runs().len()).sum(), "run");
+            let benches = if scenarios.len() > 1 { format!(" on {} benches", scenarios.len()) } else { String::new() };
+            let summary = format!("a scenario of {runs}{benches}, {length} s each; run it with `tactflow verify`");
+            let report = scenarios.iter().find_map(|scenario| scenario.warnings()).cloned();
             let ok = report.is_none() || !args.deny_warnings;
             Checked { ok, summary, ..Checked::of(path, report) }
         }

@@ -13,8 +13,8 @@ use crate::source::{Code, Item, Key, SourceMap, Table, Value, suggestion};
 pub(crate) struct ScenarioTable {
     /// Task to run.
     pub(crate) graph: FilePath,
-    /// Bench to run it on; by default the task's own.
-    pub(crate) bench: Option<FilePath>,
+    /// Bench to run it on, or a list of benches; by default the task's own.
+    pub(crate) bench: Option<Benches>,
     /// Number of seeds, from 1 on, or a list of seeds. Each run sets its seed as the `seed` of every device that has
     /// one.
     pub(crate) seeds: Option<Seeds>,
@@ -34,6 +34,24 @@ pub(crate) struct ScenarioTable {
     /// Values to print beside the figures: facts of devices as `role.fact`, and parameters as `devices.NAME.key`.
     #[param(default = vec![])]
     pub(crate) facts: Vec<Spanned<String>>,
+}
+
+/// The benches on which a scenario runs its task: one or more.
+#[derive(Debug, Clone)]
+pub(crate) struct Benches(pub(super) Vec<FilePath>);
+
+impl Param for Benches {
+    const EXPECTS: &'static str = "the path of a bench, or a list of such paths";
+
+    fn read(value: &Value, reader: &mut Reader<'_>) -> Option<Self> {
+        match &value.item {
+            Item::Array(items) if !items.is_empty() => {
+                items.iter().map(|item| FilePath::read(item, reader)).collect::<Option<_>>().map(Self)
+            }
+            Item::String(_) => FilePath::read(value, reader).map(|file| Self(vec![file])),
+            _ => reader.wrong_type(value, Self::EXPECTS),
+        }
+    }
 }
 
 /// The seeds and their position in the source.
@@ -77,13 +95,15 @@ pub(super) struct Document {
 }
 
 impl Document {
-    /// Returns the task, and the bench if one is given, even if other keys of the section have mistakes.
-    pub(super) fn files(&self, sources: &SourceMap) -> Vec<FilePath> {
+    /// Returns the task, if it is given, and the benches, even if other keys of the section have mistakes.
+    pub(super) fn files(&self, sources: &SourceMap) -> (Option<FilePath>, Vec<FilePath>) {
         // Mistakes in these two keys have been reported when the section was read.
         let mut reader = Reader::new(sources);
-        let mut file = |key: &str| FilePath::read(self.section.as_table()?.get(key)?, &mut reader);
-        let (graph, bench) = (file("graph"), file("bench"));
-        graph.into_iter().flat_map(|graph| [Some(graph), bench.clone()]).flatten().collect()
+        let section = self.section.as_table();
+        let value = |key: &str| section.and_then(|section| section.get(key));
+        let graph = value("graph").and_then(|value| FilePath::read(value, &mut reader));
+        let benches = value("bench").and_then(|value| Benches::read(value, &mut reader));
+        (graph, benches.map_or_else(Vec::new, |benches| benches.0))
     }
 }
 

@@ -7,15 +7,22 @@ use super::lookup::look_up;
 use super::model::Scenario;
 use crate::catalogue::Catalogue;
 use crate::graph::{Loader, Request, compile_in, into_diagnostic, wrong_file_type};
-use crate::node::{FilePath, Reader};
+use crate::node::Reader;
 use crate::source::{Code, Diagnostic, Report, Table};
 
 impl Scenario {
-    /// Loads a scenario and checks it with its task and its bench.
+    /// Loads a scenario and checks it with its task and each of its benches. Returns a scenario for each bench.
     ///
     /// # Errors
-    /// Returns a diagnostic for every mistake in all files.
-    pub fn load(catalogue: &Catalogue, path: &Path) -> Result<Self, Report> {
+    /// Returns a diagnostic for every mistake in the scenario, in its task, and in the first bench with mistakes.
+    pub fn load(catalogue: &Catalogue, path: &Path) -> Result<Vec<Self>, Report> {
+        let (first, benches) = Self::load_on(catalogue, path, 0)?;
+        let more = (1..benches).map(|i| Self::load_on(catalogue, path, i).map(|(scenario, _)| scenario));
+        [Ok(first)].into_iter().chain(more).collect()
+    }
+
+    /// Loads a scenario on one of its benches, by its number from 0. Returns the number of benches, too.
+    fn load_on(catalogue: &Catalogue, path: &Path, bench: usize) -> Result<(Self, usize), Report> {
         let mut loader = Loader::new(catalogue.builtin_files());
         let root = loader.read(path, None);
         let mut found = std::mem::take(&mut loader.diagnostics);
@@ -38,18 +45,22 @@ impl Scenario {
         found.extend(document.checks.iter().flat_map(|check| check.mistakes(for_s)));
         found.extend(document.faults.iter().filter_map(|fault| fault.mistake(for_s)));
         found.extend(without_checks(&root, &document));
-        let files = document.files(&loader.sources);
-        let unreadable: Vec<Diagnostic> =
-            files.iter().filter_map(|file| Some(into_diagnostic(file.bytes().err()?))).collect();
-        let Some(request) = request(&files).filter(|_| unreadable.is_empty()) else {
+        let (graph, benches) = document.files(&loader.sources);
+        let files = graph.iter().chain(&benches);
+        let unreadable: Vec<Diagnostic> = files.filter_map(|file| Some(into_diagnostic(file.bytes().err()?))).collect();
+        let Some(graph) = graph.filter(|_| unreadable.is_empty()) else {
             found.extend(unreadable);
             return Err(Report::new(loader.sources, found));
         };
+        let file = benches.get(bench).map(|file| file.path.clone());
+        let request = Request { bench: file.clone(), ..Request::file(&graph.path) };
         match compile_in(loader, catalogue, &request) {
             Ok(mut plan) => {
                 let vary = document.scenario.as_ref().and_then(|table| table.vary.as_ref());
                 found.extend(vary.into_iter().flat_map(|vary| vary.mistakes(catalogue, &request, plan.outline())));
-                look_up(&document, request, &mut plan, catalogue, found)
+                let name = file.filter(|_| benches.len() > 1).map(|file| name_of(&file));
+                let scenario = look_up(&document, request, &mut plan, catalogue, found)?;
+                Ok((Self { bench: name, ..scenario }, benches.len()))
             }
             Err(report) => {
                 found.extend(report.diagnostics);
@@ -59,10 +70,9 @@ impl Scenario {
     }
 }
 
-/// Returns the request for the task on its bench, if the scenario names a task.
-fn request(files: &[FilePath]) -> Option<Request> {
-    let (graph, bench) = (files.first()?, files.get(1));
-    Some(Request { bench: bench.map(|bench| bench.path.clone()), ..Request::file(&graph.path) })
+/// Returns the name of a bench: that of its file.
+fn name_of(file: &Path) -> String {
+    file.file_stem().unwrap_or(file.as_os_str()).to_string_lossy().into_owned()
 }
 
 /// Returns a diagnostic for a scenario that checks nothing.

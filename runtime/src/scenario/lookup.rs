@@ -49,6 +49,7 @@ pub(super) fn look_up(
             for_s: table.for_s,
             seeds: table.seeds.as_ref().map(|seeds| seeds.list.clone()).unwrap_or_default(),
             facts: table.facts.iter().filter_map(|word| lookup.fact(word)).filter(|(name, _)| !varies(name)).collect(),
+            bench: None,
             request,
             seed_keys: lookup.seeds(table, catalogue, !injections.is_empty() || table.vary.is_some()),
             injections,
@@ -297,7 +298,7 @@ impl Lookup<'_> {
     /// Rejects a bench with live devices.
     fn real_time(&mut self, table: &ScenarioTable) {
         if self.plan.is_live() {
-            let at = table.bench.as_ref().unwrap_or(&table.graph);
+            let at = table.bench.as_ref().and_then(|benches| benches.0.first()).unwrap_or(&table.graph);
             let message = "a device of this bench runs in real time, but scenarios run in virtual time";
             let help = "use a bench of simulated devices; to record a run in real time, use `tactflow run --out`";
             self.found.push(Diagnostic::new(Code::WrongRole, at.span.clone(), message).help(help));

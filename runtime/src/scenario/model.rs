@@ -17,6 +17,8 @@ pub struct Scenario {
     pub seeds: Vec<u64>,
     /// Facts and parameters of devices to print beside the figures.
     pub facts: Vec<(String, toml::Value)>,
+    /// Name of the bench, if the file names several.
+    pub bench: Option<String>,
     pub(super) request: Request,
     /// The faults that every run injects.
     pub(super) injections: Vec<Injection>,

@@ -110,12 +110,13 @@ impl Varied {
         }
         let refused = |value: f64| {
             let report = compile(catalogue, &request.clone().set(assignment(&self.path, value))).err()?;
-            let why = report.diagnostics.first().map(|first| first.message.clone()).unwrap_or_default();
+            let first = report.diagnostics.first();
+            let why = first.map(|first| first.message.clone()).unwrap_or_default();
             let found = wrong(format!("the task does not load with `{}`: {why}", assignment(&self.path, value)));
             Some(if why.contains("a whole number") {
                 found.help("a parameter that takes any number can vary")
             } else {
-                found
+                found.with_help(first.and_then(|first| first.help.clone()))
             })
         };
         [self.low, self.high].into_iter().find_map(refused)

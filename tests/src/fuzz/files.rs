@@ -112,7 +112,7 @@ fn check(catalogue: &Catalogue, folder: &Path, place: &Place) -> bool {
                 Request { bench: bench.as_ref().map(|bench| folder.join(bench)), ..Request::file(folder.join(graph)) };
             compile(catalogue, &request).map(|compiled| compiled.warnings())
         }
-        Read::Scenario => Scenario::load(catalogue, &file).map(|scenario| scenario.warnings().cloned()),
+        Read::Scenario => Scenario::load(catalogue, &file).map(|all| all.iter().find_map(Scenario::warnings).cloned()),
         Read::Urdf(tip) => {
             let urdf = FilePath { path: file, span: 0..0, builtin: None };
             return model::load(&urdf, tip, &Mount::NONE).map_err(|mistakes| check_mistakes(&mistakes, None)).is_ok();

@@ -22,14 +22,18 @@ fn check_mounts(params: &Params) -> Mistakes {
     let mut mistakes = Mistakes::new();
     let dt = params.step_s;
     for (i, thing) in params.objects.iter().enumerate() {
-        let Some(mount) = thing.mount else { continue };
-        let rate = mount / thing.mass;
-        if !is_resolved(rate, 2.0 * MOUNT_DAMPING * rate.sqrt(), dt) {
-            let message = format!(
-                "a mount of {} N/m with {} kg oscillates too fast for a `step_s` of {dt} s: make `step_s` smaller",
-                mount, thing.mass
-            );
-            mistakes.push(object(i, message));
+        for (mount, mass, [of, with]) in
+            [(thing.mount, thing.mass, ["N/m", "kg"]), (thing.turn_mount, thing.inertia, ["N m/rad", "kg m²"])]
+        {
+            let Some(mount) = mount else { continue };
+            let rate = mount / mass;
+            if !is_resolved(rate, 2.0 * MOUNT_DAMPING * rate.sqrt(), dt) {
+                let message = format!(
+                    "a mount of {mount} {of} with {mass} {with} oscillates too fast for a `step_s` of {dt} s: make \
+                     `step_s` smaller"
+                );
+                mistakes.push(object(i, message));
+            }
         }
     }
     mistakes

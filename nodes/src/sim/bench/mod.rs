@@ -82,8 +82,11 @@ pub struct Params {
 /// In the role `force_sensor` it measures the wrench of all contacts at the tip: of the pad, and of a `housing`, a hard
 /// capsule around the tool that the pad does not see. The tool has no weight and no inertia of its own.
 ///
-/// Not simulated: gravity, coupling of the joints, rotation of objects under load, interaction between columns of foam,
-/// friction on the housing, wear and temperature.
+/// The controller compensates gravity, up to a `gravity_error`, and a `load` at the sensor couples the joints. An object
+/// with a `turn_mount` turns under a load. `gain_error` lets the tactels differ from their calibration.
+///
+/// Not simulated: coupling of the joints by the masses of the links, interaction between columns of foam, friction on
+/// the housing, wear and temperature.
 ///
 /// ```toml
 /// [roles]

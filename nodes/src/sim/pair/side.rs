@@ -84,6 +84,8 @@ impl SideParams {
                 damping_ratio: self.damping_ratio.unwrap_or(shared.arm.damping_ratio),
                 inertia: self.inertia.as_ref().or(shared.arm.inertia.as_ref()).cloned(),
                 friction: self.friction.unwrap_or(shared.arm.friction),
+                load: shared.arm.load,
+                gravity_error: shared.arm.gravity_error,
                 acceleration: self.acceleration.unwrap_or(shared.arm.acceleration),
             },
         })

@@ -22,7 +22,7 @@ pub struct ArmAndPad {
     pub(super) contact: Contact,
     imprint: Imprint,
     /// Force on the object, which the contact states and nothing reads: the wrench on the pad has it too.
-    load: [Vec3; 1],
+    load: [Wrench; 1],
 }
 
 impl ArmAndPad {
@@ -32,7 +32,7 @@ impl ArmAndPad {
         let spread = foam.spread;
         let contact = Contact::new(shape.clone(), foam, apart, 1).with_damped_shear();
         let imprint = Imprint::new(shape, contact.fine, spread);
-        Self { base, arm, contact, imprint, load: [Vec3::ZERO] }
+        Self { base, arm, contact, imprint, load: [Wrench::default()] }
     }
 
     /// Returns pose and velocity of the pad in the cell.

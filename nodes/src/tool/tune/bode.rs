@@ -138,7 +138,7 @@ fn dots(feature: &TunedFeature, i: usize, curve: &[Point]) -> Vec<Point> {
     let dot = |k: usize| {
         let hz = first[k].omega / (2.0 * PI);
         let open = all(k).map(|line| line.open).sum::<Complex<f64>>() * scale;
-        let far = |at: &&Point| (at[0] / hz).ln().abs();
+        let far = |at: &&Point| libm::log(at[0] / hz).abs();
         let near = curve.iter().min_by(|a, b| far(a).total_cmp(&far(b))).map_or(-90.0, |at| at[2]);
         point(hz, open, near)
     };

@@ -121,18 +121,23 @@ fn prepare(args: &VerifyArgs, catalogue: &Catalogue) -> Result<Vec<Verified>, St
         files.extend(if path.is_dir() { files_of(path)? } else { vec![path.clone()] });
     }
     let load = |path: PathBuf| {
-        let mut loaded = Scenario::load(catalogue, &path);
-        if let (Ok(scenario), Some(count)) = (&mut loaded, args.seeds) {
-            scenario.set_seeds(count);
-        }
-        Verified { path, loaded, trials: Vec::new(), rows: Vec::new() }
+        let loaded = match Scenario::load(catalogue, &path) {
+            Ok(scenarios) => scenarios.into_iter().map(Ok).collect(),
+            Err(report) => vec![Err(report)],
+        };
+        loaded.into_iter().map(move |mut loaded| {
+            if let (Ok(scenario), Some(count)) = (&mut loaded, args.seeds) {
+                scenario.set_seeds(count);
+            }
+            Verified { path: path.clone(), loaded, trials: Vec::new(), rows: Vec::new() }
+        })
     };
-    let all: Vec<Verified> = files.into_iter().map(load).collect();
+    let all: Vec<Verified> = files.into_iter().flat_map(load).collect();
     if let Some(folder) = &args.out {
         let mut names = BTreeSet::new();
         if let Some(twice) = all.iter().map(Verified::name).find(|name| !names.insert(name.clone())) {
             return Err(format!(
-                "two scenarios are called `{twice}`, so their recordings would have the same name: rename one of the files"
+                "two scenarios are called `{twice}`, so their recordings would have the same name: rename a file"
             ));
         }
         std::fs::create_dir_all(folder).map_err(|error| format!("cannot create `{}`: {error}", folder.display()))?;
@@ -214,5 +219,6 @@ fn in_parallel<T: Send + Sync>(
 }
 
 fn record_name(scenario: &str, seed: Option<u64>) -> String {
+    let scenario = scenario.replace(' ', "_");
     seed.map_or_else(|| format!("{scenario}.csv"), |seed| format!("{scenario}-{seed}.csv"))
 }

@@ -16,8 +16,13 @@ pub(crate) struct Verified {
 }
 
 impl Verified {
+    /// Returns the name of the file, and that of the bench if the file names several.
     pub(crate) fn name(&self) -> String {
-        self.path.file_stem().unwrap_or(self.path.as_os_str()).to_string_lossy().into_owned()
+        let name = self.path.file_stem().unwrap_or(self.path.as_os_str()).to_string_lossy();
+        match self.loaded.as_ref().ok().and_then(|scenario| scenario.bench.as_ref()) {
+            Some(bench) => format!("{name} on {bench}"),
+            None => name.into_owned(),
+        }
     }
 
     /// Returns why runs could not be measured, each with its run.
