@@ -26,6 +26,7 @@ mod docs;
 mod doctor;
 #[cfg(target_os = "linux")]
 mod doctor_press;
+mod draw;
 mod erased;
 mod errors;
 mod examples;

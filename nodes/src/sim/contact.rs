@@ -16,6 +16,7 @@ use tactflow_runtime::signal::ImageShape;
 use super::bristle::BristleShear;
 use super::foam::{self, Foam, FoamColumn};
 use super::object::Object;
+use super::wrench::Wrench;
 
 /// Speed over which friction falls from its static to its sliding value [m/s].
 const STRIBECK_SPEED: f64 = 0.001;
@@ -33,28 +34,6 @@ pub struct BodyMotion {
     pub linear: Vec3,
     /// Angular velocity [rad/s].
     pub angular: Vec3,
-}
-
-/// A force on a body, and a moment about a point that the user states.
-#[derive(Debug, Clone, Copy, Default, PartialEq)]
-pub struct Wrench {
-    /// Force [N].
-    pub force: Vec3,
-    /// Moment [N m].
-    pub moment: Vec3,
-}
-
-impl Wrench {
-    /// Adds a force at a place.
-    pub(super) fn push(&mut self, place: Vec3, force: Vec3) {
-        self.force += force;
-        self.moment += place.cross(force);
-    }
-
-    /// Returns the same load with its moment about a point, for one about a point that is `from` there.
-    pub(super) fn about(self, from: Vec3) -> Self {
-        Self { moment: self.moment + from.cross(self.force), ..self }
-    }
 }
 
 /// The foam of the pad in contact with objects.

@@ -6,8 +6,9 @@
 use parry3d_f64::math::Vec3;
 use tactflow_runtime::node::Param;
 
-use super::contact::{BodyMotion, Wrench};
+use super::contact::BodyMotion;
 use super::object::Object;
+use super::wrench::Wrench;
 use crate::arm::capsule::{Capsule, Tool};
 use crate::arm::mount::Mount;
 

@@ -16,8 +16,9 @@ use nalgebra::{Matrix3, Vector3, Vector6};
 use parry3d_f64::math::Vec3;
 use tactflow_runtime::signal::{Pose, Twist};
 
-use super::contact::{BodyMotion, Wrench};
+use super::contact::BodyMotion;
 use super::shape::pose3;
+use super::wrench::Wrench;
 use crate::arm::chain::Chain;
 
 /// Dynamic properties of a joint.

@@ -4,7 +4,7 @@
 //! | module | what it simulates |
 //! |---|---|
 //! | [`shape`], [`object`] | the objects |
-//! | [`foam`], [`bristle`], [`contact`], [`imprint`] | the pad: forces on each tactel |
+//! | [`foam`], [`bristle`], [`contact`], [`imprint`], [`wrench`] | the pad: forces on each tactel |
 //! | [`housing`] | what else of the tool touches objects |
 //! | [`readout`], [`frames`] | the electronics: counts from forces, and when an image is available |
 //! | [`joints`] | the arm |
@@ -14,8 +14,8 @@
 //! | [`bench`] | the device `sim_bench` |
 //! | [`pair`] | the device `sim_pair`, with its own world and a free object |
 //!
-//! Not simulated: interaction between columns of foam (bulging, shear waves); rotation of the objects of `sim_bench`
-//! under load; gravity on arms, Coriolis forces, coupling of the joints and elasticity of the gears; wear, adhesion and temperature.
+//! Not simulated: interaction between columns of foam (bulging, shear waves); coupling of the joints by the masses of
+//! the links, Coriolis forces and elasticity of the gears; wear, adhesion and temperature.
 
 pub mod arm_model;
 pub mod bench;
@@ -35,6 +35,7 @@ pub mod steps;
 pub mod survey;
 pub mod truth;
 pub mod world;
+pub mod wrench;
 
 #[cfg(test)]
 mod testing;

@@ -5,8 +5,8 @@ use parry3d_f64::shape::{Ball, Cuboid};
 use tactflow_runtime::node::Param;
 use tactflow_runtime::signal::Pose;
 
-use super::contact::Wrench;
 use super::shape::{Geometry, pose3};
+use super::wrench::Wrench;
 use crate::motion::pose::pose_of;
 use crate::usual::{USUAL_RAD, USUAL_REACH_M};
 

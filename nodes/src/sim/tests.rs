@@ -5,7 +5,7 @@ use parry3d_f64::math::{Pose3, Vec3};
 use tactflow_runtime::device::Disturbance;
 use tactflow_runtime::signal::{ImageShape, Joint as Limits, Unit};
 
-use super::contact::{BodyMotion, Contact, Wrench};
+use super::contact::{BodyMotion, Contact};
 use super::foam::Foam;
 use super::imprint::Imprint;
 use super::joints::{ArmLoad, JointDynamics, SimArm};
@@ -13,6 +13,7 @@ use super::object::{Object, ObjectParams, ScriptedMove, ShapeKind};
 use super::steps::is_resolved;
 use super::testing::{ball, thing};
 use super::world::World;
+use super::wrench::Wrench;
 use crate::arm::chain::{Chain, ChainSegment, JointKind};
 use crate::arm::model::load;
 use crate::arm::mount::Mount;

@@ -4,13 +4,14 @@ use parry3d_f64::math::{Rot3, Vec3};
 use tactflow_runtime::device::Disturbance;
 use tactflow_runtime::signal::ImageShape;
 
-use super::contact::{Contact, Wrench};
+use super::contact::Contact;
 use super::foam::Foam;
 use super::housing::Housing;
 use super::imprint::Imprint;
 use super::joints::SimArm;
 use super::object::Object;
 use super::survey::{Measured, Survey, measure};
+use super::wrench::Wrench;
 
 /// The arm, the pad and the objects.
 pub struct World {

@@ -14,6 +14,7 @@
 
 mod check;
 mod completions;
+mod draw;
 mod explain;
 mod reference;
 mod run;
@@ -82,6 +83,7 @@ impl Tool {
                 derived(list::list),
                 derived(describe::describe),
                 derived(show::show),
+                derived(draw::draw),
                 derived(completions::completions),
             ],
         }

@@ -44,6 +44,7 @@ const RUNTIME: &[&str] = &[
     "cli/view",
     "cli/still",
     "cli/run",
+    "cli/draw",
     "cli/verify",
     "cli/reference",
     "cli",

@@ -7,9 +7,9 @@
 
 use parry3d_f64::math::{Pose3, Rot3, Vec3};
 
-use crate::sim::contact::Wrench;
 use crate::sim::object::Object;
 use crate::sim::shape::Geometry;
+use crate::sim::wrench::Wrench;
 
 /// Standard acceleration of gravity [m/s²].
 pub const GRAVITY_M_PER_S2: f64 = 9.806_65;

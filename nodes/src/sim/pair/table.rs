@@ -8,8 +8,8 @@ use parry3d_f64::math::{Vec2, Vec3};
 
 use super::body::{Body, GRAVITY_M_PER_S2};
 use crate::sim::bristle::BristleShear;
-use crate::sim::contact::Wrench;
 use crate::sim::shape::Geometry;
+use crate::sim::wrench::Wrench;
 
 /// Depth to which the object sinks into the table under its own weight [m].
 pub const SAG_M: f64 = 1e-4;

@@ -9,9 +9,9 @@ use super::carried::{CarriedParams, CarriedShape};
 use super::table::Table;
 use super::world::{ArmAndPad, PairWorld};
 use crate::arm::chain::{Chain, ChainSegment, JointKind};
-use crate::sim::contact::Wrench;
 use crate::sim::foam::Foam;
 use crate::sim::joints::{JointDynamics, SimArm};
+use crate::sim::wrench::Wrench;
 
 /// Half of the width of the box between the pads [m].
 const HALF_WIDTH: f64 = 0.03;

@@ -8,10 +8,11 @@ use tactflow_runtime::signal::ImageShape;
 
 use super::body::Body;
 use super::table::Table;
-use crate::sim::contact::{BodyMotion, Contact, Wrench};
+use crate::sim::contact::{BodyMotion, Contact};
 use crate::sim::foam::Foam;
 use crate::sim::imprint::Imprint;
 use crate::sim::joints::SimArm;
+use crate::sim::wrench::Wrench;
 
 /// An arm with its pad, on a base in the cell.
 pub struct ArmAndPad {

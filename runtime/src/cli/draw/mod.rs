@@ -1,0 +1,78 @@
+//! `draw`: a graph as a picture, with its parts as boxes, or its modes.
+
+mod dot;
+mod layout;
+mod mermaid;
+mod modes;
+mod picture;
+mod svg;
+mod wires;
+
+use std::path::PathBuf;
+
+use clap::ValueEnum;
+
+use super::shell::Shell;
+use super::shell::command::GraphArgs;
+use crate::graph::compile;
+
+/// Draw a graph: its roles, nodes and wires, with parts as boxes, or its modes
+#[derive(clap::Parser)]
+#[command(
+    name = "draw",
+    after_help = "The picture goes to the standard output. Each wire has its port, its kind, its unit and its frames.
+
+Examples:
+  tactflow draw graphs/hybrid.toml > hybrid.svg
+  tactflow draw graphs/hybrid.toml --modes > modes.svg
+  tactflow draw graphs/hybrid.toml --format mermaid     for a Markdown page
+  tactflow draw graphs/hybrid.toml --format dot | dot -Tpdf > hybrid.pdf"
+)]
+pub(crate) struct DrawArgs {
+    /// The graph file
+    graph: PathBuf,
+    #[command(flatten)]
+    graph_args: GraphArgs,
+    /// Draw the modes and what leads from one to another
+    #[arg(long)]
+    modes: bool,
+    /// Leave out what the wires carry
+    #[arg(long)]
+    plain: bool,
+    /// Format of the picture
+    #[arg(long, value_enum, default_value_t = DrawFormat::Svg, value_name = "FORMAT")]
+    format: DrawFormat,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum DrawFormat {
+    /// A picture for a browser or a paper.
+    Svg,
+    /// A diagram in the language of Mermaid.
+    Mermaid,
+    /// A graph in the language of Graphviz.
+    Dot,
+}
+
+pub(crate) fn draw(args: DrawArgs, shell: &Shell) -> u8 {
+    let plan = match compile(shell.catalogue(), &args.graph_args.request(args.graph.clone())) {
+        Ok(plan) => plan,
+        Err(report) => return shell.reject(&report),
+    };
+    let title = args.graph.display().to_string();
+    let mut picture = match args.modes {
+        true if plan.outline().modes.is_empty() => return shell.refuse("the graph has no modes to draw"),
+        true => modes::picture(plan.outline(), title),
+        false => wires::picture(&plan, title),
+    };
+    if args.plain {
+        picture.arrows.iter_mut().for_each(|arrow| arrow.lines.clear());
+    }
+    let text = match args.format {
+        DrawFormat::Svg => svg::text(&picture),
+        DrawFormat::Mermaid => mermaid::text(&picture),
+        DrawFormat::Dot => dot::text(&picture),
+    };
+    shell.say(text.trim_end());
+    0
+}
