@@ -114,6 +114,7 @@ pub fn catalogue() -> Catalogue {
         .node::<servo::hold_pose::HoldPose>()
         .node::<servo::follow_path::FollowPath>()
         .node::<servo::park::Park>()
+        .node::<servo::pivot::Pivot>()
         .node::<servo::twist_adder::TwistAdder>()
         .node::<servo::compose_twist::ComposeTwist>()
         .node::<servo::edge_guard::EdgeGuard>()

@@ -26,7 +26,7 @@ const SMALL_PAD: &str = "rows = 8\ncols = 8\npitch = 0.003\nrate_hz = 100\n";
 const TASKS: [(&str, &[&str], f64, Option<usize>); 10] = [
     ("cable", &["approach", "servo"], 2.0, Some(2)),
     ("edge", &["approach", "servo"], 2.0, Some(0)),
-    ("explore", &["approach", "align", "across"], 3.0, Some(2)),
+    ("explore", &["approach", "align", "scan"], 3.0, Some(2)),
     ("finger_press", &["none"], 2.0, None),
     ("force", &["approach", "servo"], 2.0, Some(0)),
     ("hybrid", &["approach", "servo"], 2.0, Some(2)),

@@ -12,6 +12,7 @@ pub mod integral;
 pub mod inverse_jacobian;
 pub mod park;
 pub mod pid;
+pub mod pivot;
 pub mod placement;
 pub mod projector;
 pub mod ridge_guide;

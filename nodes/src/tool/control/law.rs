@@ -117,6 +117,7 @@ fn collect(nodes: &Nodes<'_>, port: &str, passes: [bool; 6], law: &mut Law) {
             let passes = std::array::from_fn(|i| passes[i] && select[i] != 0.0);
             source(node, "twist").into_iter().for_each(|twist| collect(nodes, twist, passes, law));
         }
+        "pivot" => source(node, "twist").into_iter().for_each(|twist| collect(nodes, twist, passes, law)),
         "twist_source" => {
             let twist: [f64; 6] = nodes.value(node, "twist").and_then(|twist| twist.value.read()).unwrap_or_default();
             let twist = masked(twist);

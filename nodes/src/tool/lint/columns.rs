@@ -109,6 +109,7 @@ fn projectors<'a>(nodes: &Nodes<'a>, port: &str) -> Vec<(&'a OutlinedBlock, &'a 
     let Some(node) = nodes.writer(port) else { return Vec::new() };
     match node.kind.text.as_str() {
         "twist_adder" => node.wires.iter().flat_map(|wire| projectors(nodes, &wire.source)).collect(),
+        "pivot" => source(node, "twist").map_or_else(Vec::new, |twist| projectors(nodes, twist)),
         "projector" => {
             let behind = source(node, "twist").and_then(|twist| nodes.writer(twist));
             behind
