@@ -15,6 +15,8 @@
 mod check;
 mod completions;
 mod explain;
+#[cfg(feature = "mcap")]
+mod recorded;
 mod reference;
 mod run;
 mod shell;
@@ -73,7 +75,7 @@ pub struct Tool {
 impl Tool {
     /// Creates the tool with the commands that work for every catalogue.
     pub fn new(catalogue: Catalogue) -> Self {
-        Self {
+        let tool = Self {
             catalogue,
             commands: vec![
                 derived(run::run),
@@ -84,7 +86,10 @@ impl Tool {
                 derived(show::show),
                 derived(completions::completions),
             ],
-        }
+        };
+        #[cfg(feature = "mcap")]
+        let tool = recorded::commands().into_iter().fold(tool, Self::command);
+        tool
     }
 
     /// Adds a command.
