@@ -14,6 +14,7 @@ use tactflow_tests::{catalogue, workspace};
 
 use crate::record::record_live;
 use crate::replay::ticks_of_replay;
+use crate::tool::say;
 
 const GRAPH: &str = "
 [graph]
@@ -283,6 +284,24 @@ fn recorded_and_replayed(plan: Compiled, request: &Request) -> End {
     let ticks = ticks_of_replay(&path).unwrap_or_else(|why| panic!("{why}"));
     assert!(ticks >= 5, "{ticks} ticks");
     end
+}
+
+#[test]
+fn a_live_device_is_recorded_by_the_tool_and_replayed_by_another_process() {
+    let folder = tempfile::tempdir().unwrap();
+    let [graph, run] = ["graph.toml", "run.mcap"].map(|name| folder.path().join(name));
+    let peer = Peer::start(60, 0.02, 9.0, "0");
+    let bench =
+        format!("[bind]\na = 'tcp'\n[devices.tcp]\ntype = 'line_length'\naddress = '127.0.0.1:{}'\n", peer.port);
+    std::fs::write(&graph, format!("{GRAPH}{bench}")).unwrap();
+    let [graph, run] = [&graph, &run].map(|path| path.to_str().unwrap());
+    let said = say(&["run", graph, "-q", "--for", "1s", "--record", run]);
+    assert_eq!(said.code, 0, "{}", said.err);
+    drop(peer);
+    let said = say(&["replay", run, "-q"]);
+    // A replay prints the halts of the run again.
+    assert_eq!(said.code, 0, "{}", said.err);
+    assert!(said.out.ends_with(" ports: the same to the last bit\n"), "{}", said.out);
 }
 
 flaky!(FailsWhileRecorded, FAILS_WHILE_RECORDED, false);

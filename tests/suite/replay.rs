@@ -220,3 +220,20 @@ fn what_is_no_recording_and_what_has_no_effect_is_said() {
     let wrong = replay(&path, &["--set", "nodes.nothing.gain=1"]);
     assert!(wrong.code == 2 && wrong.err.contains("`nothing`"), "{}", wrong.err);
 }
+
+#[test]
+fn the_runs_of_scenarios_come_again() {
+    // With files of three folders, with parameters that vary, on the scripted bench, and with a fault as the end.
+    let shipped = ["graphs/scenarios/noise.toml", "graphs/scenarios/edge_turns.toml"];
+    let own = ["tests/scenarios/slide.toml", "tests/scenarios/mock.toml", "tests/scenarios/fault.toml"];
+    for scenario in shipped.into_iter().chain(own) {
+        let folder = tempfile::tempdir().unwrap();
+        let run = say(&["verify", scenario, "--seeds", "1", "--record", folder.path().to_str().unwrap()]);
+        assert_ne!(run.code, 2, "{scenario}: {}", run.err);
+        let files: Vec<PathBuf> = fs::read_dir(folder.path()).unwrap().map(|file| file.unwrap().path()).collect();
+        assert_eq!(files.len(), 1, "{scenario}");
+        let said = replay(&files[0], &["-q"]);
+        assert_eq!(said.code, 0, "{scenario}: {}", said.err);
+        assert!(said.out.ends_with(" ports: the same to the last bit\n"), "{scenario}: {}", said.out);
+    }
+}

@@ -95,7 +95,8 @@ impl Loader {
     pub(super) fn sections<T>(&mut self, read: impl FnOnce(&mut Sections<'_>) -> T) -> T {
         let mut sections = Sections::new(&self.sources);
         let result = read(&mut sections);
-        let (diagnostics, measured) = sections.finish();
+        let (diagnostics, measured, files) = sections.finish();
+        self.sources.add_named(files);
         self.diagnostics.extend(diagnostics);
         self.measured.add(None, measured);
         result
