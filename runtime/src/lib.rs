@@ -10,7 +10,7 @@
 //! - [`device`]: the contract of devices
 //! - [`example`]: example graphs from a catalogue
 //! - [`random`]: seeded random numbers
-//! - [`record`]: recordings of runs; [`scenario`]: checks on the results of runs
+//! - [`record`]: recordings of runs as tables; `recording`: whole runs, behind the feature `mcap`; [`scenario`]: checks on the results of runs
 //! - [`harness`]: test rigs for nodes and graphs
 //! - `cli`: the command line as a library, behind the feature `cli`
 
@@ -30,6 +30,8 @@ pub mod node;
 mod outline;
 pub mod random;
 pub mod record;
+#[cfg(feature = "mcap")]
+pub mod recording;
 pub mod scenario;
 pub mod signal;
 pub mod source;

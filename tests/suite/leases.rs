@@ -10,10 +10,13 @@ use std::time::{Duration, Instant};
 use tactflow_runtime::engine::{self, End, Engine, Outcome, RunOptions};
 use tactflow_runtime::fault::Cause;
 use tactflow_runtime::graph::{Request, compile};
+use tactflow_runtime::record::OutputFile;
+use tactflow_runtime::recording::{RecordRequest, RunRecorder};
 use tactflow_runtime::source::Code;
 use tactflow_tests::catalogue;
 
 use crate::cli::in_new_folder;
+use crate::replay::ticks_of_replay;
 use crate::tool::tool;
 
 const GRAPH: &str = "
@@ -260,4 +263,34 @@ fn a_motor_that_nothing_stops_does_not_load() {
         };
         assert_eq!(codes, if is_refused { vec![Code::UnwatchedDevice] } else { vec![] }, "{params}");
     }
+}
+
+#[test]
+fn a_recorded_run_with_a_lost_lease_comes_again_without_the_motor() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("run.mcap");
+    let motor = Motor::listen();
+    let request = Request { bench_text: Some(motor.bench()), ..Request::text(GRAPH) };
+    let plan = compile(&catalogue(), &request).unwrap_or_else(|report| panic!("{}", report.render(false)));
+    let mut engine = Engine::new(plan);
+    let record = RecordRequest { request: &request, is_real: true, seed: None, path: None };
+    let mut recorder = RunRecorder::start(OutputFile::create(&path).unwrap(), &mut engine, &record).unwrap();
+    let sends = vec![(1.2, "resume".to_owned()), (9.0, "stop".to_owned())];
+    let options = RunOptions { duration: Some(1.6), sends, ..RunOptions::default() };
+    let mut has_hung = false;
+    let outcome = engine::run(&mut engine, &options, &mut |engine| {
+        recorder.record(engine, || false);
+        if engine.now() > 500_000_000 && !has_hung {
+            has_hung = true;
+            thread::sleep(Duration::from_millis(300));
+        }
+    });
+    let outcome = outcome.unwrap();
+    recorder.end(&engine, &outcome.end);
+    let recorded = recorder.finish(|_| true);
+    assert!(recorded.error.is_none() && recorded.lost + recorded.lost_ports == 0, "{recorded:?}");
+    motor.told();
+    let halt = &engine.halts()[0];
+    assert!(halt.fault.cause == Cause::LostLease && halt.until.is_some(), "{:?}", engine.halts());
+    assert_eq!(ticks_of_replay(&path), Ok(outcome.ticks));
 }

@@ -7,10 +7,14 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use tactflow_runtime::device::{Description, Device, DeviceError, Driver, Link, Live, Opened, Output};
 use tactflow_runtime::engine::{self, End, Engine, RunOptions};
 use tactflow_runtime::fault::Cause;
-use tactflow_runtime::graph::{Request, compile};
+use tactflow_runtime::graph::{Compiled, Request, compile};
 use tactflow_runtime::node::{Describe, Mistakes};
 use tactflow_runtime::signal::{Scalar, ScalarShape, Unit};
 use tactflow_tests::{catalogue, workspace};
+
+use crate::record::record_live;
+use crate::replay::ticks_of_replay;
+use crate::tool::say;
 
 const GRAPH: &str = "
 [graph]
@@ -268,4 +272,55 @@ fn a_peer_that_is_not_there_is_a_fault_of_the_device() {
     let (end, ..) = run(&nobody, 5.0);
     let End::Fault(fault) = end else { panic!("{end:?}") };
     assert!(matches!(&fault.cause, Cause::Device(message) if message.contains("127.0.0.1:1")), "{fault}");
+}
+
+/// Runs a graph on live devices, records it, and replays it without them. How the run ended.
+fn recorded_and_replayed(plan: Compiled, request: &Request) -> End {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("run.mcap");
+    let mut engine = Engine::new(plan);
+    let options = RunOptions { duration: Some(1.0), ..RunOptions::default() };
+    let end = record_live(&mut engine, request, &path, &options);
+    let ticks = ticks_of_replay(&path).unwrap_or_else(|why| panic!("{why}"));
+    assert!(ticks >= 5, "{ticks} ticks");
+    end
+}
+
+#[test]
+fn a_live_device_is_recorded_by_the_tool_and_replayed_by_another_process() {
+    let folder = tempfile::tempdir().unwrap();
+    let [graph, run] = ["graph.toml", "run.mcap"].map(|name| folder.path().join(name));
+    let peer = Peer::start(60, 0.02, 9.0, "0");
+    let bench =
+        format!("[bind]\na = 'tcp'\n[devices.tcp]\ntype = 'line_length'\naddress = '127.0.0.1:{}'\n", peer.port);
+    std::fs::write(&graph, format!("{GRAPH}{bench}")).unwrap();
+    let [graph, run] = [&graph, &run].map(|path| path.to_str().unwrap());
+    let said = say(&["run", graph, "-q", "--for", "1s", "--record", run]);
+    assert_eq!(said.code, 0, "{}", said.err);
+    drop(peer);
+    let said = say(&["replay", run, "-q"]);
+    // A replay prints the halts of the run again.
+    assert_eq!(said.code, 0, "{}", said.err);
+    assert!(said.out.ends_with(" ports: the same to the last bit\n"), "{}", said.out);
+}
+
+flaky!(FailsWhileRecorded, FAILS_WHILE_RECORDED, false);
+
+#[test]
+fn a_recorded_run_of_live_devices_comes_again_without_them() {
+    let bench = "devices.b = { type = 'fails_while_recorded', reconnect = true }\nbind.a = 'b'";
+    let request = Request { bench_text: Some(bench.into()), ..Request::text(GRAPH) };
+    let plan = compile(&catalogue().device::<FailsWhileRecorded>(), &request);
+    let plan = plan.unwrap_or_else(|report| panic!("{}", report.render(false)));
+    assert_eq!(recorded_and_replayed(plan, &request), End::Duration);
+    for (last_word, policy) in [("hang-up", "hold"), ("garbage", "fault"), ("0", "fault")] {
+        let peer = Peer::start(30, 0.01, 0.3, last_word);
+        let address = format!("devices.tcp.address = '127.0.0.1:{}'", peer.port);
+        let bench = format!("devices.tcp.type = 'line_length'\n{address}\nbind.a = 'tcp'");
+        let graph = format!("{GRAPH}\n[policy]\ndevice = \"{policy}\"\n");
+        let request = Request { bench_text: Some(bench), ..Request::text(graph) };
+        let plan = compile(&catalogue(), &request).unwrap_or_else(|report| panic!("{}", report.render(false)));
+        let end = recorded_and_replayed(plan, &request);
+        assert_eq!(matches!(end, End::Fault(_)), last_word == "garbage", "{end:?}");
+    }
 }

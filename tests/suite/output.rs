@@ -234,7 +234,7 @@ fn a_dash_is_standard_output_and_the_summary_goes_to_standard_error() {
     let twice = said(&mut tool(&[&virtual_time[..], &["--out=-", "--svg=-"]].concat()));
     assert_eq!(
         (twice.code, twice.err.as_str()),
-        (2, "error: only one of `--out`, `--points` and `--svg` can be `-`\n")
+        (2, "error: only one of `--out`, `--record`, `--points` and `--svg` can be `-`\n")
     );
     let head = said(&mut shell("$RUN -q --out - 2>/dev/null | head -1; exit ${PIPESTATUS[0]}", &path));
     assert_eq!((head.code, head.out.as_str()), (0, "# time [s]\n"));

@@ -1,7 +1,11 @@
-//! What a tick does not do: allocate, or call the operating system.
+//! What a tick does not do, recorded or not: allocate, or call the operating system.
+
+use std::path::Path;
 
 use tactflow_runtime::engine::Engine;
 use tactflow_runtime::graph::{Request, compile};
+use tactflow_runtime::record::OutputFile;
+use tactflow_runtime::recording::{RecordRequest, RunRecorder};
 use tactflow_tests::examples::graph_of_all;
 use tactflow_tests::{catalogue, shipped_graphs};
 
@@ -16,18 +20,35 @@ fn engine(request: &Request) -> Engine {
     Engine::new(plan.unwrap_or_else(|report| panic!("{}", report.render(false))))
 }
 
+/// Records an engine as a run in real time does.
+fn recorder(engine: &mut Engine, request: &Request, path: &Path) -> RunRecorder {
+    let record = RecordRequest { request, is_real: true, seed: None, path: None };
+    RunRecorder::start(OutputFile::create(path).unwrap(), engine, &record).unwrap()
+}
+
 #[test]
 fn the_tick_neither_allocates_nor_frees_in_any_shipped_graph() {
+    let folder = tempfile::tempdir().unwrap();
     for (graph, request) in graphs() {
-        let mut engine = engine(&request);
+        let (mut engine, mut plain) = (engine(&request), engine(&request));
+        let mut recorder = recorder(&mut engine, &request, &folder.path().join("run.mcap"));
         let mut ticks = 0;
         while let Some(now) = engine.next().filter(|_| ticks < 1800) {
-            engine.exchange(now).unwrap();
+            // A device may allocate. The log of its samples does not.
+            let [logged, unlogged] = [&mut engine, &mut plain]
+                .map(|engine| allocation_counter::measure(|| engine.exchange(now).unwrap()).count_total);
+            assert_eq!(logged, unlogged, "{graph} in the exchange of tick {}", engine.ticks());
+            plain.step().unwrap();
             // From latch to commit: contact comes, flickers and goes in every graph, and states are reset.
-            let counted = allocation_counter::measure(|| engine.step().unwrap());
+            let counted = allocation_counter::measure(|| {
+                engine.step().unwrap();
+                recorder.record(&engine, || false);
+            });
             assert_eq!(counted.count_total, 0, "{graph} in tick {}", engine.ticks());
             ticks += 1;
         }
+        let recorded = recorder.finish(|_| true);
+        assert!(recorded.error.is_none() && recorded.ticks + recorded.lost == ticks, "{graph}: {recorded:?}");
         assert!(ticks > 300, "{graph}: {ticks} ticks");
     }
 }
@@ -67,21 +88,28 @@ fn the_tick_makes_no_system_call() {
 #[ignore = "run by `the_tick_makes_no_system_call` in a process of its own"]
 fn in_a_jail() {
     let mode = std::env::var("TACTFLOW_JAIL").expect("run by another test");
-    let mut engines: Vec<Engine> = graphs().iter().map(|(_, request)| engine(request)).collect();
+    let started = graphs().into_iter().map(|(_, request)| {
+        let mut engine = engine(&request);
+        let recorder = recorder(&mut engine, &request, Path::new("/dev/null"));
+        (engine, recorder)
+    });
+    let mut engines: Vec<(Engine, RunRecorder)> = started.collect();
     // Whatever a first panic or a first float would set up lazily is set up by the first tick.
-    for engine in &mut engines {
+    for (engine, recorder) in &mut engines {
         let now = engine.next().unwrap();
         engine.tick(now).unwrap();
+        recorder.record(engine, || false);
     }
     jail();
     if mode == "escape" {
         // Any call that is not allowed.
         let _ = std::fs::metadata("/");
     }
-    for engine in &mut engines {
+    for (engine, recorder) in &mut engines {
         let mut ticks = 0;
         while let Some(now) = engine.next().filter(|_| ticks < 1000) {
             engine.tick(now).unwrap();
+            recorder.record(engine, || false);
             ticks += 1;
         }
     }

@@ -209,7 +209,7 @@ mod tests {
     }
 
     fn load_text(text: &str, tip: &str, mount: &Mount) -> Result<Chain, Mistakes> {
-        let bytes = Some(&*text.as_bytes().to_vec().leak());
+        let bytes = Some(text.as_bytes().to_vec().into());
         load(&FilePath { builtin: bytes, ..file("gantry.urdf") }, tip, mount)
     }
 

@@ -16,6 +16,8 @@ mod check;
 mod completions;
 mod draw;
 mod explain;
+#[cfg(feature = "mcap")]
+mod recorded;
 mod reference;
 mod run;
 mod shell;
@@ -74,7 +76,7 @@ pub struct Tool {
 impl Tool {
     /// Creates the tool with the commands that work for every catalogue.
     pub fn new(catalogue: Catalogue) -> Self {
-        Self {
+        let tool = Self {
             catalogue,
             commands: vec![
                 derived(run::run),
@@ -86,7 +88,10 @@ impl Tool {
                 derived(draw::draw),
                 derived(completions::completions),
             ],
-        }
+        };
+        #[cfg(feature = "mcap")]
+        let tool = recorded::commands().into_iter().fold(tool, Self::command);
+        tool
     }
 
     /// Adds a command.

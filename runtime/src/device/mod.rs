@@ -12,6 +12,7 @@ mod exchange;
 mod lease;
 mod live;
 mod misfits;
+mod recorded;
 mod silence;
 
 use std::borrow::Cow;
@@ -31,6 +32,7 @@ pub use exchange::{Commands, Samples};
 pub(crate) use exchange::{PortSample, SampleState};
 pub use live::{Link, Live};
 pub(crate) use live::{LinkSetup, Linked, start, wait};
+pub use recorded::RecordedDevice;
 pub use silence::{OnSilence, Silence};
 
 /// The type of a role: the ports that a task reads, and the ports that it commands.
@@ -175,6 +177,11 @@ pub enum Driver {
     Lockstep(Box<dyn Stepped>),
     /// By itself, in real time.
     Live(Box<dyn Live>),
+    /// Not at all: a replay writes its samples. `is_live`: whether the device was live when it was recorded.
+    Recorded {
+        /// Whether it ran in real time.
+        is_live: bool,
+    },
 }
 
 /// A device that is described and ready to run.
@@ -267,7 +274,7 @@ impl<D: Device> DeviceType for TypedDevice<D> {
             Ok(mut opened) => {
                 opened.description.again = Some(Again(Arc::new(move || match D::open(params.clone()).ok()?.driver {
                     Driver::Live(driver) => Some(driver),
-                    Driver::Stepped(_) | Driver::Lockstep(_) => None,
+                    Driver::Stepped(_) | Driver::Lockstep(_) | Driver::Recorded { .. } => None,
                 })));
                 Some(opened)
             }

@@ -13,7 +13,8 @@ use crate::graph::compiled::Compiled;
 use crate::graph::load::{FlatGraph, Loader, Request};
 use crate::graph::net::{Net, slow_down};
 use crate::graph::outline::OutlineBuilder;
-use crate::graph::plan::{AllowedWarning, Plan, PlannedCommand, PlannedMode, PlannedNode, PortRef};
+use crate::graph::plan::{AllowedWarning, Plan, PlannedCommand, PlannedMode, PlannedNode, PortRef, RecordedPorts};
+use crate::graph::syntax::RecordTable;
 use crate::source::{Code, Diagnostics, Report, Severity, SourceMap};
 
 /// Checks and builds a graph.
@@ -21,7 +22,11 @@ use crate::source::{Code, Diagnostics, Report, Severity, SourceMap};
 /// # Errors
 /// All diagnostics of its files.
 pub fn compile(catalogue: &Catalogue, request: &Request) -> Result<Compiled, Report> {
-    compile_in(Loader::new(catalogue.builtin_files()), catalogue, request)
+    let mut loader = Loader::new(catalogue.builtin_files());
+    if let Some(files) = request.recorded.as_ref().and_then(|recorded| recorded.files.clone()) {
+        loader.sources = loader.sources.with_attached(files);
+    }
+    compile_in(loader, catalogue, request)
 }
 
 /// Returns the roles that a bench adds to every task, each with its type.
@@ -35,9 +40,7 @@ pub(crate) fn compile_in(mut loader: Loader, catalogue: &Catalogue, request: &Re
     loader.joined = joined_roles(catalogue);
     let mut flat = loader.load(request);
     let Loader { mut sources, mut diagnostics, mut measured, has_wrong_roles, .. } = loader;
-    let is_unreadable =
-        |code: Code| matches!(code, Code::Syntax | Code::Unreadable | Code::EndlessPart | Code::WrongFile);
-    if has_wrong_roles || diagnostics.iter().any(|found| is_unreadable(found.code)) {
+    if has_wrong_roles || has_unreadable(&diagnostics) {
         // The checks would report everything that a missing file declares, or a missing role provides, as missing.
         return Err(Report::new(sources, split(diagnostics).0));
     }
@@ -45,9 +48,10 @@ pub(crate) fn compile_in(mut loader: Loader, catalogue: &Catalogue, request: &Re
         bench::add_models(bench, catalogue, &mut diagnostics);
     }
     let slow = request.slow.unwrap_or(1.0);
+    let recorded = request.recorded.as_ref().map(|recorded| recorded.devices.as_slice());
     slow_down(&mut flat.limits, slow);
     let net = Net::new(&flat, catalogue, &mut diagnostics);
-    let opened = bench::open(&net, slow, &mut sources, &mut diagnostics);
+    let opened = bench::open(&net, (slow, recorded), &mut sources, &mut diagnostics);
     check_wires(&net, &opened, &mut diagnostics);
     let view = check::view::check(&net, &mut diagnostics);
     let mut frames = check::frames::check(&net, &mut diagnostics);
@@ -101,7 +105,24 @@ pub(crate) fn compile_in(mut loader: Loader, catalogue: &Catalogue, request: &Re
     let (exports, silences) = (net.exports_by_name(), check::silence::describe(&net, &opened));
     let to_commission = bench::to_commission(&net, &opened, &sources);
     let plan = Plan { roles, devices: opened.devices, nodes, commands, clock, period, tasks, reach, allowed };
-    Ok(Compiled { plan, view, sources, warnings, outline, exports, facts, silences, to_commission })
+    let recorded = RecordedPorts::default();
+    let all = Compiled { plan, view, sources, warnings, outline, exports, facts, silences, to_commission, recorded };
+    with_recorded(all, flat.record.as_ref())
+}
+
+/// Whether a file is not TOML, cannot be read or is of the wrong sort.
+fn has_unreadable(diagnostics: &Diagnostics) -> bool {
+    let is_unreadable =
+        |code: Code| matches!(code, Code::Syntax | Code::Unreadable | Code::EndlessPart | Code::WrongFile);
+    diagnostics.iter().any(|found| is_unreadable(found.code))
+}
+
+/// Selects the ports of a recording, or reports patterns that match no port.
+fn with_recorded(mut compiled: Compiled, table: Option<&RecordTable>) -> Result<Compiled, Report> {
+    let mut unmatched = Diagnostics::new();
+    let ports: Vec<&str> = compiled.ports().map(|port| port.name.as_str()).collect();
+    compiled.recorded = check::record::check(table, &ports, &mut unmatched);
+    if unmatched.is_empty() { Ok(compiled) } else { Err(Report::new(compiled.sources, unmatched)) }
 }
 
 /// Checks what needs neither frames nor limits.

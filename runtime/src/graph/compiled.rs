@@ -4,7 +4,9 @@ use std::collections::BTreeSet;
 
 use crate::device::Driver;
 use crate::graph::bench::CommissionedDevice;
-use crate::graph::plan::{AllowedWarning, Plan, PlannedNode, PlannedPort, PlannedTask, PlannedView, Producer};
+use crate::graph::plan::{
+    AllowedWarning, Plan, PlannedNode, PlannedPort, PlannedTask, PlannedView, Producer, RecordedPorts,
+};
 use crate::outline::Outline;
 use crate::source::{Code, Diagnostic, Report, SourceMap};
 
@@ -21,6 +23,7 @@ pub struct Compiled {
     pub(crate) facts: Vec<(String, toml::Value)>,
     pub(crate) silences: Vec<String>,
     pub(crate) to_commission: Vec<CommissionedDevice>,
+    pub(crate) recorded: RecordedPorts,
 }
 
 impl Compiled {

@@ -24,9 +24,9 @@ pub use bench::{BenchDevice, CommissionedDevice, OpenBench, open_bench};
 pub use compile::compile;
 pub(crate) use compile::compile_in;
 pub use compiled::Compiled;
-pub use load::Request;
 pub(crate) use load::{Loader, wrong_file_type};
-pub use plan::{AllowedWarning, PlannedPort};
+pub use load::{RecordedGraph, Request};
+pub use plan::{AllowedWarning, PlannedPort, RecordedPorts};
 pub(crate) use plan::{
     Clock, Condition, Plan, PlannedCommand, PlannedDevice, PlannedExit, PlannedModes, PlannedNode, PlannedRole,
     PlannedShow, PlannedTask, PlannedView, PlannedWire, PortRef, Producer, Reach, Test,

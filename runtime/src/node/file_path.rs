@@ -1,5 +1,6 @@
 //! The path of a file that a parameter names.
 
+use std::borrow::Cow;
 use std::ops::Range;
 use std::path::PathBuf;
 
@@ -10,6 +11,6 @@ pub struct FilePath {
     pub path: PathBuf,
     /// The place of its name in the source map.
     pub span: Range<usize>,
-    /// The contents, if it is a file of the catalogue.
-    pub builtin: Option<&'static [u8]>,
+    /// The contents, if it is a file of the catalogue or of a recording.
+    pub builtin: Option<Cow<'static, [u8]>>,
 }

@@ -136,8 +136,8 @@ impl FilePath {
     /// # Errors
     /// If the file is not readable; the place is that of its name.
     pub fn bytes(&self) -> Result<Cow<'static, [u8]>, Mistake> {
-        match self.builtin {
-            Some(bytes) => Ok(Cow::Borrowed(bytes)),
+        match &self.builtin {
+            Some(bytes) => Ok(bytes.clone()),
             None => std::fs::read(&self.path).map(Cow::Owned).map_err(|error| Mistake::unreadable(self, &error)),
         }
     }

@@ -88,6 +88,8 @@ pub struct Reader<'a> {
     pub(super) entry: Option<(usize, usize)>,
     /// The values so far that were written with a unit.
     pub measured: Measured,
+    /// The files so far that parameters name.
+    pub(crate) files: Vec<PathBuf>,
     /// The usual numbers of the current field.
     usual: Usual,
     /// The mistakes so far.
@@ -120,6 +122,7 @@ impl<'a> Reader<'a> {
             entry: None,
             usual: Usual::NONE,
             measured: Vec::new(),
+            files: Vec::new(),
             mistakes: Vec::new(),
             warnings: Vec::new(),
         }
@@ -272,7 +275,10 @@ impl<'a> Reader<'a> {
         let path = self.sources.path(text, span.start);
         match self.sources.builtin(&path) {
             Ok(None) if !path.exists() => self.missing_file(text, path, span),
-            Ok(builtin) => Some(FilePath { path, span, builtin }),
+            Ok(builtin) => {
+                self.files.push(path.clone());
+                Some(FilePath { path, span, builtin })
+            }
             Err(unknown) => {
                 let mistake = Mistake::new(Code::Unreadable, At::Span(span), unknown.message);
                 self.mistakes.push(match unknown.similar {

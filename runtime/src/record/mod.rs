@@ -9,7 +9,11 @@ mod writer;
 
 pub use columns::{PortColumn, PortColumns, recorded};
 pub use output::{OutputFile, write_whole};
+#[cfg(feature = "mcap")]
+pub(crate) use output::{Writing, not_read};
 #[cfg(feature = "cli")]
 pub use points::{PointPorts, PointRecorder, PointsRequest};
 pub use recorder::{Recorded, Recorder};
 pub use writer::{RecordFormat, RowFormat};
+#[cfg(feature = "mcap")]
+pub(crate) use writer::{seconds as file_seconds, time_text as seconds_text};

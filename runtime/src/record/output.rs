@@ -39,6 +39,22 @@ impl OutputFile {
         Ok(File::options().write(true).create(true).truncate(false).open(path)?.into())
     }
 
+    /// Creates a file after this one, in the same output. An existing file is overwritten only if it begins with `start`.
+    ///
+    /// # Errors
+    /// If it cannot be created, or is of another sort.
+    #[cfg(feature = "mcap")]
+    pub(crate) fn beside(&self, path: &Path, start: &[u8]) -> io::Result<Self> {
+        use std::io::Read;
+        let mut head = Vec::new();
+        let read = File::open(path).and_then(|file| file.take(start.len() as u64).read_to_end(&mut head));
+        if read.is_ok() && !head.is_empty() && head != start {
+            let why = format!("`{}` exists and is not a recording, so it is not overwritten", path.display());
+            return Err(io::Error::other(why));
+        }
+        Ok(Self { progress: Arc::clone(&self.progress), ..Self::create(path)? })
+    }
+
     /// Removes the content of a file; a pipe or a device has none.
     ///
     /// # Errors
@@ -70,7 +86,7 @@ impl OutputFile {
     }
 
     /// Writes bytes. On an error, returns how many were written before.
-    pub(super) fn write(&mut self, bytes: &[u8]) -> Result<(), (usize, io::Error)> {
+    pub(crate) fn write(&mut self, bytes: &[u8]) -> Result<(), (usize, io::Error)> {
         self.write_counted(bytes, |_| {})
     }
 
@@ -103,7 +119,7 @@ impl From<File> for OutputFile {
 }
 
 /// A thread that writes a file.
-pub(super) struct Writing<T> {
+pub(crate) struct Writing<T> {
     thread: JoinHandle<T>,
     progress: Arc<AtomicU64>,
 }
@@ -113,7 +129,7 @@ impl<T: Send + 'static> Writing<T> {
     ///
     /// # Errors
     /// If the thread cannot be started.
-    pub(super) fn start(
+    pub(crate) fn start(
         mut file: OutputFile,
         work: impl FnOnce(&mut OutputFile) -> T + Send + 'static,
     ) -> io::Result<Self> {
@@ -127,7 +143,7 @@ impl<T: Send + 'static> Writing<T> {
     ///
     /// # Panics
     /// If the work panicked.
-    pub(super) fn finish(self, mut goes_on: impl FnMut(u64) -> bool) -> Option<T> {
+    pub(crate) fn finish(self, mut goes_on: impl FnMut(u64) -> bool) -> Option<T> {
         while !self.thread.is_finished() {
             if !goes_on(self.progress.load(Ordering::Relaxed)) {
                 return None;
@@ -148,6 +164,6 @@ pub fn write_whole(file: OutputFile, bytes: Vec<u8>, goes_on: impl FnMut(u64) ->
 }
 
 /// The error of a file that was given up.
-pub(super) fn not_read() -> io::Error {
+pub(crate) fn not_read() -> io::Error {
     io::Error::new(ErrorKind::TimedOut, "it was not read in time")
 }

@@ -58,7 +58,7 @@ impl RowFormat {
     }
 
     /// Writes the lines before the rows.
-    pub(super) fn header(self, columns: &[PortColumn], out: &mut impl Write) -> io::Result<()> {
+    pub(crate) fn header(self, columns: &[PortColumn], out: &mut impl Write) -> io::Result<()> {
         match self.format {
             RecordFormat::Csv => {
                 self.names().iter().try_for_each(|name| writeln!(out, "# {name} [s]"))?;
@@ -79,7 +79,7 @@ impl RowFormat {
     }
 
     /// Writes one row: the bits of the times [ns], and one value per column. NaN stands for an absent value.
-    pub(super) fn row(self, columns: &[PortColumn], row: &[f64], out: &mut impl Write) -> io::Result<()> {
+    pub(crate) fn row(self, columns: &[PortColumn], row: &[f64], out: &mut impl Write) -> io::Result<()> {
         let (times, row) = row.split_at(self.times());
         let times = self.names().iter().zip(times).map(|(name, time)| (*name, time_text(time.to_bits() as i64)));
         match self.format {
@@ -109,13 +109,13 @@ impl RowFormat {
 }
 
 /// Writes nanoseconds as seconds, without an exponent and with at least one decimal.
-fn time_text(nanos: i64) -> String {
+pub(crate) fn time_text(nanos: i64) -> String {
     let seconds = seconds(nanos);
     if seconds.fract() == 0.0 { format!("{seconds:.1}") } else { seconds.to_string() }
 }
 
 /// Converts nanoseconds to seconds. The result is the float next to the decimal number, so it is printed without noise.
-pub(super) fn seconds(nanos: i64) -> f64 {
+pub(crate) fn seconds(nanos: i64) -> f64 {
     const MAX_EXACT: i64 = 1 << 53;
     // Beyond 104 days a float does not hold the nanoseconds, and microseconds still do.
     if nanos.abs() < MAX_EXACT { nanos as f64 / 1e9 } else { (nanos / 1000) as f64 / 1e6 }

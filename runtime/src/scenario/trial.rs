@@ -9,11 +9,11 @@ use super::inject::inject;
 use super::judge::FigureRow;
 use super::model::Scenario;
 use super::observer::{NotChecked, Observer, seconds};
+use super::run_file::RunFile;
 use super::vary::assignment;
 use crate::catalogue::Catalogue;
 use crate::engine::{End, Engine, run_virtual};
 use crate::graph::{Request, compile};
-use crate::record::{RecordFormat, Recorder};
 
 /// The result of one run.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -49,8 +49,8 @@ impl Scenario {
         rows
     }
 
-    /// Runs the scenario with one seed, and records every tick to the file `record`, if it is given. Returns `None` if
-    /// the run was interrupted.
+    /// Runs the scenario with one seed, and records every tick to the file `record`, if it is given: its numbers, or the
+    /// whole run if the name ends in .mcap. Returns `None` if the run was interrupted.
     #[must_use]
     pub fn run(
         &self,
@@ -70,7 +70,8 @@ impl Scenario {
                 figures,
             })
         };
-        let mut engine = match compile(catalogue, &self.seeded(seed)) {
+        let request = self.seeded(seed);
+        let mut engine = match compile(catalogue, &request) {
             Ok(mut compiled) => {
                 inject(&mut compiled, &self.injections, seed.unwrap_or(0));
                 Engine::new(compiled)
@@ -80,7 +81,7 @@ impl Scenario {
                 return failed(0.0, first.unwrap_or_default());
             }
         };
-        let recorder = record.map(|path| Recorder::create(path, RecordFormat::Csv.rows(false), &engine)).transpose();
+        let recorder = record.map(|path| RunFile::create(path, &mut engine, &request, seed)).transpose();
         let mut recorder = match recorder {
             Ok(recorder) => recorder,
             Err(error) => return failed(0.0, format!("the recording cannot be created: {error}")),
@@ -92,7 +93,7 @@ impl Scenario {
                 recorder.record(engine, || !is_interrupted());
             }
         });
-        let unwritten = recorder.and_then(|recorder| recorder.finish(|_| true).error);
+        let unwritten = recorder.and_then(|recorder| recorder.finish(&engine, &outcome.end));
         let time = seconds(outcome.time);
         let is_short = time + 1.5 * seconds(engine.period()) < self.for_s;
         let failure = match (&outcome.end, &unwritten) {

@@ -1,11 +1,13 @@
 //! Vectors of named features. Each feature has its own unit and freshness.
 
+use serde::{Deserialize, Serialize};
+
 use super::all_finite;
 use super::freshness::{Freshness, Mark, Stamp};
 use super::unit::Unit;
 
 /// The name and unit of one feature.
-#[derive(Debug, Clone, PartialEq, Eq, Default)]
+#[derive(Debug, Clone, PartialEq, Eq, Default, Serialize, Deserialize)]
 pub struct Feature {
     /// Name in the graph file.
     pub name: String,
@@ -14,7 +16,7 @@ pub struct Feature {
 }
 
 /// The shape of a feature vector.
-#[derive(Debug, Clone, PartialEq, Eq, Default)]
+#[derive(Debug, Clone, PartialEq, Eq, Default, Serialize, Deserialize)]
 pub struct FeaturesShape {
     /// The features, in the order of the components.
     pub features: Vec<Feature>,

@@ -1,9 +1,11 @@
 //! Tactile images.
 
+use serde::{Deserialize, Serialize};
+
 use super::unit::Unit;
 
 /// The shape of an image.
-#[derive(Debug, Clone, PartialEq, Default)]
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct ImageShape {
     /// Number of rows; row i runs along the sensor's y.
     pub rows: usize,

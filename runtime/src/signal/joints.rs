@@ -1,10 +1,12 @@
 //! Joint vectors and Jacobians.
 
+use serde::{Deserialize, Serialize};
+
 use super::spatial::Twist;
 use super::unit::Unit;
 
 /// The name and limits of one joint.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Joint {
     /// Name in the robot's model.
     pub name: String,
@@ -27,7 +29,7 @@ impl Default for Joint {
 }
 
 /// The shape of a joint vector, or of the columns of a Jacobian.
-#[derive(Debug, Clone, PartialEq, Default)]
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct JointsShape {
     /// The joints from the base to the tip.
     pub joints: Vec<Joint>,

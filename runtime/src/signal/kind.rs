@@ -2,6 +2,9 @@
 
 use std::fmt;
 
+use serde::{Deserialize, Serialize};
+
+use super::spatial::NoProperties;
 use super::unit::is_same;
 use super::{
     Features, FeaturesShape, Grid, Image, ImageShape, Jacobian, Joints, JointsShape, Mark, Mask, Pose, PoseShape,
@@ -14,7 +17,7 @@ pub type Scalar = f64;
 pub type Flag = bool;
 
 /// The shape of a scalar.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct ScalarShape {
     /// Unit of the value.
     pub unit: Unit,
@@ -43,8 +46,21 @@ impl ScalarShape {
 }
 
 /// The shape of a flag, which has no properties.
-#[derive(Debug, Clone, PartialEq, Eq, Default)]
+#[derive(Debug, Clone, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(from = "NoProperties", into = "NoProperties")]
 pub struct FlagShape;
+
+impl From<FlagShape> for NoProperties {
+    fn from(_: FlagShape) -> Self {
+        Self {}
+    }
+}
+
+impl From<NoProperties> for FlagShape {
+    fn from(_: NoProperties) -> Self {
+        Self
+    }
+}
 
 /// A value on a wire. Each kind has one type.
 #[diagnostic::on_unimplemented(
@@ -161,7 +177,7 @@ macro_rules! kinds {
         }
 
         /// The shape of a signal of any kind: its properties that are known at load.
-        #[derive(Debug, Clone, PartialEq)]
+        #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
         pub enum Shape { $(#[doc = concat!("Shape of a ", $word, ".")] $kind($shape)),* }
 
         impl Shape {
@@ -266,7 +282,7 @@ macro_rules! kinds {
 /// The shape of a mask: the array of tactels.
 pub type MaskShape = Grid;
 /// The shape of a Jacobian: the joints of its columns.
-#[derive(Debug, Clone, PartialEq, Default)]
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct JacobianShape(pub JointsShape);
 
 kinds! {

@@ -1,9 +1,11 @@
 //! Binary images with one bit per tactel.
 
+use serde::{Deserialize, Serialize};
+
 use super::image::ImageShape;
 
 /// The size and pitch of an array of tactels.
-#[derive(Debug, Clone, PartialEq, Default)]
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct Grid {
     /// Number of rows.
     pub rows: usize,

@@ -3,6 +3,7 @@
 //! Other crates can add nodes but not kinds, so the recorder, the finite check and the bridges handle every kind in one
 //! place. The shape fixes the size of a value, so every slot is allocated at load and never later.
 
+mod bytes;
 mod decimal;
 mod features;
 mod freshness;
@@ -18,6 +19,7 @@ mod spatial;
 mod unit;
 mod unit_size;
 
+pub(crate) use bytes::{ByteReader, put_text};
 pub use features::{Component, Feature, Features, FeaturesShape};
 pub use freshness::{Freshness, Mark, Stamp};
 pub use image::{Image, ImageShape};

@@ -1,10 +1,12 @@
 //! The connected regions of a mask, as runs of tactels.
 
+use serde::{Deserialize, Serialize};
+
 use super::mask::Grid;
 use super::unit::Unit;
 
 /// The shape of a list of regions.
-#[derive(Debug, Clone, PartialEq, Default)]
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct RegionsShape {
     /// The array of tactels.
     pub grid: Grid,

@@ -1,6 +1,7 @@
 //! Twists and poses.
 
 use nalgebra::{IsometryMatrix3, Vector3, Vector6};
+use serde::{Deserialize, Serialize};
 
 /// A velocity twist `[v; omega]` [m/s, rad/s].
 ///
@@ -33,12 +34,29 @@ impl Twist {
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Pose(pub IsometryMatrix3<f64>);
 
+/// A shape without properties in a recording: an empty table.
+#[derive(Clone, Serialize, Deserialize)]
+pub(super) struct NoProperties {}
+
 /// The shape of a twist, which has no properties: its frames belong to the wire.
-#[derive(Debug, Clone, PartialEq, Eq, Default)]
+#[derive(Debug, Clone, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(from = "NoProperties", into = "NoProperties")]
 pub struct TwistShape;
 
+impl From<TwistShape> for NoProperties {
+    fn from(_: TwistShape) -> Self {
+        Self {}
+    }
+}
+
+impl From<NoProperties> for TwistShape {
+    fn from(_: NoProperties) -> Self {
+        Self
+    }
+}
+
 /// The shape of a pose: what is known of it before a run. Its frames belong to the wire.
-#[derive(Debug, Clone, PartialEq, Default)]
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct PoseShape {
     /// Origin at the start of a run, if it is known [m].
     pub start: Option<[f64; 3]>,

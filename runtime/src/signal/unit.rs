@@ -3,6 +3,8 @@
 use std::fmt;
 use std::str::FromStr;
 
+use serde::{Deserialize, Serialize};
+
 use crate::source::quoted;
 
 /// The base of a unit.
@@ -45,7 +47,8 @@ const NAMES: [(Base, &str); 10] = [
 ];
 
 /// A unit: a base, optionally per tactel and per a power of seconds.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default, Serialize, Deserialize)]
+#[serde(into = "String", try_from = "String")]
 #[must_use]
 pub struct Unit {
     /// The base.
@@ -123,6 +126,20 @@ impl FromStr for Unit {
 
     fn from_str(text: &str) -> Result<Self, String> {
         Self::parse(text.as_bytes()).ok_or_else(|| format!("`{text}` is not a unit; units are {}", Self::list()))
+    }
+}
+
+impl TryFrom<String> for Unit {
+    type Error = String;
+
+    fn try_from(text: String) -> Result<Self, String> {
+        text.parse()
+    }
+}
+
+impl From<Unit> for String {
+    fn from(unit: Unit) -> Self {
+        unit.to_string()
     }
 }
 

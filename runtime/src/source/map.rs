@@ -1,8 +1,11 @@
 //! The source map: all texts of a graph laid end to end, so that one byte range identifies a place in any of them.
 
+use std::borrow::Cow;
 use std::cmp::Ordering;
+use std::collections::{BTreeMap, BTreeSet};
 use std::ops::Range;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 use serde::Serialize;
 
@@ -95,11 +98,18 @@ pub struct UnknownBuiltin {
 /// Prefix of the path of a file that is built into a catalogue.
 const BUILTIN: &str = "builtin:";
 
+/// Files by their paths, as a recording attaches them.
+pub type AttachedFiles = BTreeMap<PathBuf, Vec<u8>>;
+
 /// All texts of a graph: its files and the assignments of the command line.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct SourceMap {
     files: Vec<SourceFile>,
     builtin: Vec<BuiltinFile>,
+    /// The files that stand for all files of the disk and of the catalogue, if the graph is that of a recording.
+    attached: Option<Arc<AttachedFiles>>,
+    /// The files that parameters name.
+    named: BTreeSet<PathBuf>,
 }
 
 impl SourceMap {
@@ -109,17 +119,32 @@ impl SourceMap {
     /// Creates an empty source map with the given built-in files.
     #[must_use]
     pub fn with_builtin(files: &[BuiltinFile]) -> Self {
-        Self { files: Vec::new(), builtin: files.to_vec() }
+        Self { builtin: files.to_vec(), ..Self::default() }
     }
 
-    /// Returns the bytes of `builtin:NAME`, or `None` if the path is not a built-in one.
+    /// Reads no other file than these from now on.
+    #[must_use]
+    pub fn with_attached(self, files: Arc<AttachedFiles>) -> Self {
+        Self { attached: Some(files), ..self }
+    }
+
+    /// Returns the bytes of `builtin:NAME`, or `None` if the path is not a built-in one. In the graph of a recording,
+    /// returns the bytes of any file that is attached to it.
     ///
     /// # Errors
     /// The message if no built-in file has that name, and the path of one with a similar name or a list of all.
-    pub fn builtin(&self, path: &Path) -> Result<Option<&'static [u8]>, UnknownBuiltin> {
+    pub fn builtin(&self, path: &Path) -> Result<Option<Cow<'static, [u8]>>, UnknownBuiltin> {
+        if let Some(files) = &self.attached {
+            let bytes = files.get(path).map(|bytes| Some(Cow::Owned(bytes.clone())));
+            return bytes.ok_or_else(|| UnknownBuiltin {
+                message: format!("the recording does not contain `{}`", path.display()),
+                similar: None,
+                help: "a replay reads only the files that are attached to the recording".into(),
+            });
+        }
         let Some(name) = path.to_str().and_then(|path| path.strip_prefix(BUILTIN)) else { return Ok(None) };
         match self.builtin.iter().find(|(other, _)| *other == name) {
-            Some((_, bytes)) => Ok(Some(bytes)),
+            Some((_, bytes)) => Ok(Some(Cow::Borrowed(*bytes))),
             None => {
                 let known = || self.builtin.iter().map(|(name, _)| *name);
                 Err(UnknownBuiltin {
@@ -181,6 +206,22 @@ impl SourceMap {
         self.add(name, text, path.parent().unwrap_or(Path::new("")))
     }
 
+    /// Adds files that parameters name.
+    pub(crate) fn add_named(&mut self, files: Vec<PathBuf>) {
+        self.named.extend(files);
+    }
+
+    /// Returns the files that parameters name, such as calibrations and models. Their contents are not in the source map.
+    pub fn named(&self) -> impl Iterator<Item = &Path> {
+        self.named.iter().map(PathBuf::as_path)
+    }
+
+    /// Returns the texts, in the order in which they were read.
+    #[must_use]
+    pub fn files(&self) -> &[SourceFile] {
+        &self.files
+    }
+
     /// Returns the text that contains the offset `at`.
     ///
     /// # Panics
@@ -238,7 +279,7 @@ mod tests {
         let mut sources = SourceMap::with_builtin(&[("arm.urdf", b"<robot/>")]);
         let base = sources.add_file(Path::new("a/one.toml"), "x = 1").base;
         assert_eq!(sources.builtin(Path::new("arm.urdf")), Ok(None));
-        assert_eq!(sources.builtin(Path::new("builtin:arm.urdf")), Ok(Some(b"<robot/>".as_slice())));
+        assert_eq!(sources.builtin(Path::new("builtin:arm.urdf")), Ok(Some(b"<robot/>".as_slice().into())));
         let unknown = sources.builtin(Path::new("builtin:arm.udrf")).unwrap_err();
         assert_eq!(unknown.message, "there is no built-in file `arm.udrf`");
         assert_eq!(unknown.similar.as_deref(), Some("builtin:arm.urdf"));

@@ -13,7 +13,7 @@ mod value;
 
 pub use diagnostic::{Code, Diagnostic, Diagnostics, Severity};
 pub use fix::Edit;
-pub use map::{BuiltinFile, Location, SourceFile, SourceMap, UnknownBuiltin};
+pub use map::{AttachedFiles, BuiltinFile, Location, SourceFile, SourceMap, UnknownBuiltin};
 pub(crate) use named::Named;
 pub use report::Report;
 pub use suggest::{did_you_mean, quoted, suggest_name, suggest_path, suggestion};

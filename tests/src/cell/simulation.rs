@@ -198,7 +198,8 @@ fn chains(table: &toml::Table) -> Result<[Chain; 2], String> {
         |key: &str| table.get(key).and_then(toml::Value::as_str).ok_or_else(|| format!("the arm has no `{key}`"));
     let (urdf, tip) = (text("urdf")?, text("tip")?);
     let contents = urdf.strip_prefix("builtin:").and_then(|name| builtin::FILES.iter().find(|file| file.0 == name));
-    let urdf = FilePath { path: urdf.into(), span: 0..0, builtin: contents.map(|file| file.1) };
+    let urdf =
+        FilePath { path: urdf.into(), span: 0..0, builtin: contents.map(|file| std::borrow::Cow::Borrowed(file.1)) };
     let numbers = |key: &str| -> [f64; 3] {
         let list = table.get("mount").and_then(|mount| mount.get(key)).and_then(toml::Value::as_array);
         let number = |i: usize| list.and_then(|list| list.get(i)).and_then(toml::Value::as_float);

@@ -14,7 +14,7 @@ const LWR: &[u8] = include_bytes!("../../../../graphs/robots/lwr4p.urdf");
 const BENT: [f64; 7] = [0.2, 0.6, 0.1, -1.2, 0.3, 0.9, 0.0];
 
 fn lwr() -> Chain {
-    let urdf = FilePath { path: "lwr4p.urdf".into(), span: 0..0, builtin: Some(LWR) };
+    let urdf = FilePath { path: "lwr4p.urdf".into(), span: 0..0, builtin: Some(LWR.into()) };
     load(&urdf, "lwr_7_link", &Mount { xyz: [0.0, 0.02, 0.05], rpy: [0.1, 0.2, 0.3] }).unwrap()
 }
 

@@ -206,7 +206,11 @@ fn stem(name: &str) -> &str {
 fn model(name: &str) -> Option<FilePath> {
     let has_name = |file: &str| file.strip_suffix(".urdf").is_some_and(|known| known.eq_ignore_ascii_case(stem(name)));
     let (file, bytes) = builtin::FILES.iter().find(|(file, _)| has_name(file))?;
-    Some(FilePath { path: format!("builtin:{file}").into(), span: 0..0, builtin: Some(bytes) })
+    Some(FilePath {
+        path: format!("builtin:{file}").into(),
+        span: 0..0,
+        builtin: Some(std::borrow::Cow::Borrowed(*bytes)),
+    })
 }
 
 /// Returns the names of the built-in models.

@@ -4,14 +4,19 @@ use std::io;
 use std::path::Path;
 
 use super::target::{clear, is_special, is_stdout, open};
+#[cfg(feature = "mcap")]
+use super::whole::{WholeRun, check_name};
 use super::{Job, JobOptions};
 use crate::cli::shell::patience::Patience;
 use crate::cli::shell::{FAULTED, Shell};
 use crate::cli::still::Still;
 use crate::cli::text::number::count_of;
 use crate::cli::text::svg::Svg;
-use crate::engine::{Engine, Interrupt};
+use crate::engine::{Engine, Interrupt, Outcome};
+use crate::graph::Request;
 use crate::record::{OutputFile, PointPorts, PointRecorder, PointsRequest, RecordFormat, Recorded, Recorder};
+#[cfg(feature = "mcap")]
+use crate::recording::RunRecorder;
 
 /// The open files of a run.
 pub(crate) struct OutputFiles<'j> {
@@ -21,6 +26,8 @@ pub(crate) struct OutputFiles<'j> {
     has_reported_end: bool,
     points: Option<PointRecorder>,
     still: Option<(Still, OutputFile)>,
+    #[cfg(feature = "mcap")]
+    whole: Option<WholeRun>,
 }
 
 impl JobOptions {
@@ -32,15 +39,26 @@ impl JobOptions {
         let wanted = self.points.as_ref().filter(|points| !is_special(&points.path));
         wanted.map_or(Ok(()), PointsRequest::check_extension)?;
         let points = self.points.as_ref().map(|points| points.path.as_path());
-        let files = [self.out.as_deref(), points, self.svg.as_deref()];
+        let files = [self.out.as_deref(), points, self.svg.as_deref(), self.whole()];
         match files.into_iter().flatten().filter(|path| is_stdout(path)).count() {
             0 => Ok(()),
             1 => {
                 shell.take_output();
                 Ok(())
             }
-            _ => Err("only one of `--out`, `--points` and `--svg` can be `-`".into()),
+            _ => Err("only one of `--out`, `--record`, `--points` and `--svg` can be `-`".into()),
         }
+    }
+
+    /// Returns the file of the whole run.
+    #[cfg(feature = "mcap")]
+    fn whole(&self) -> Option<&Path> {
+        self.record.as_deref()
+    }
+
+    #[cfg(not(feature = "mcap"))]
+    const fn whole(&self) -> Option<&Path> {
+        None
     }
 }
 
@@ -53,30 +71,49 @@ impl<'j> OutputFiles<'j> {
     pub(crate) fn create(
         job: &'j Job,
         chosen: Option<&PointPorts>,
-        engine: &Engine,
-        is_real: bool,
+        engine: &mut Engine,
+        (request, is_real): (&Request, bool),
         interrupt: &Interrupt,
         shell: &Shell,
     ) -> Result<Self, String> {
         let JobOptions { out, points, svg, .. } = &job.options;
         let format = out.as_deref().map(format_of).transpose()?;
         let still = svg.as_deref().map(|path| still(path, &job.title, engine)).transpose()?;
-        let open = |path: Option<&'j Path>, starts: &[&str], what| {
+        let open = |path: Option<&'j Path>, starts: &[&[u8]], what| {
             let opened = path.map(|path| Ok::<_, String>((path, open(path, starts, what, interrupt, shell)?)));
             opened.transpose()
         };
         let points = points.as_ref().map(|points| points.path.as_path());
-        let rows = open(out.as_deref(), &RecordFormat::FILE_STARTS, "a recording of a run")?;
-        let points = open(points, &[PointRecorder::FILE_START], "a file of points")?;
-        let svg = open(svg.as_deref(), &[Svg::START], "an SVG picture")?;
-        [&rows, &points, &svg].into_iter().flatten().try_for_each(|(path, file)| clear(path, file))?;
+        let rows = open(out.as_deref(), &RecordFormat::FILE_STARTS.map(str::as_bytes), "a recording of a run")?;
+        let points = open(points, &[PointRecorder::FILE_START.as_bytes()], "a file of points")?;
+        let svg = open(svg.as_deref(), &[Svg::START.as_bytes()], "an SVG picture")?;
+        #[cfg(feature = "mcap")]
+        let whole = {
+            job.options.record.as_deref().map_or(Ok(()), check_name)?;
+            open(job.options.record.as_deref(), &[RunRecorder::FILE_START], "a recording of a whole run")?
+        };
+        #[cfg(not(feature = "mcap"))]
+        let whole = None;
+        [&rows, &points, &svg, &whole].into_iter().flatten().try_for_each(|(path, file)| clear(path, file))?;
         let start = |((_, file), format): ((_, OutputFile), RecordFormat)| {
             Recorder::start(file, format.rows(is_real), engine).map_err(|error| format!("cannot record: {error}"))
         };
         let rows = rows.zip(format).map(start).transpose()?;
         let points = points.zip(chosen).map(|((_, file), chosen)| PointRecorder::new(file, chosen, engine));
         let still = still.zip(svg).map(|(still, (_, file))| (still, file));
-        Ok(Self { job, rows, has_reported_end: false, points, still })
+        #[cfg(feature = "mcap")]
+        let whole = whole.map(|file| WholeRun::start(file, engine, (request, is_real))).transpose()?;
+        #[cfg(not(feature = "mcap"))]
+        let _ = request;
+        Ok(Self {
+            job,
+            rows,
+            has_reported_end: false,
+            points,
+            still,
+            #[cfg(feature = "mcap")]
+            whole,
+        })
     }
 
     /// Adds the last tick of the engine.
@@ -98,6 +135,24 @@ impl<'j> OutputFiles<'j> {
         if let Some((still, _)) = &mut self.still {
             still.add(engine);
         }
+        #[cfg(feature = "mcap")]
+        if let Some(whole) = &mut self.whole {
+            whole.add(engine, patience);
+        }
+    }
+
+    /// Notes how the run has ended.
+    #[cfg_attr(
+        not(feature = "mcap"),
+        expect(clippy::unused_self, reason = "only a recording of the whole run needs it")
+    )]
+    pub(crate) fn end(&mut self, engine: &Engine, outcome: &io::Result<Outcome>) {
+        #[cfg(feature = "mcap")]
+        if let (Some(whole), Ok(outcome)) = (&mut self.whole, outcome) {
+            whole.end(engine, &outcome.end);
+        }
+        #[cfg(not(feature = "mcap"))]
+        let _ = (engine, outcome);
     }
 
     /// Completes the files and reports each; returns the exit code.
@@ -109,6 +164,10 @@ impl<'j> OutputFiles<'j> {
             let mut waiting = patience.begin();
             move |progress| waiting.goes_on(progress)
         };
+        #[cfg(feature = "mcap")]
+        if let Some(whole) = self.whole {
+            code = code.max(whole.finish(job, shell, wait()));
+        }
         if let (Some(path), Some(rows)) = (out, self.rows) {
             code = code.max(report_rows(job, shell, path, &rows.finish(wait())));
         }

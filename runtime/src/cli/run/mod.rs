@@ -9,9 +9,11 @@ pub(super) mod log;
 mod ports;
 mod progress;
 mod slow;
-mod summary;
+pub(super) mod summary;
 mod target;
 mod time;
+#[cfg(feature = "mcap")]
+mod whole;
 
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -99,6 +101,10 @@ pub struct JobOptions {
     /// Record all ports in a .csv or .ndjson file: one row per tick, one column per number; `-` is standard output
     #[arg(short, long, value_name = "FILE")]
     pub out: Option<PathBuf>,
+    /// Record the whole run in a .mcap file: all inputs, with which `replay` repeats it, and all ports
+    #[cfg(feature = "mcap")]
+    #[arg(long, value_name = "FILE")]
+    pub record: Option<PathBuf>,
     /// Write the points of a pose to a .ply file: FILE for the reported pose, POSE=FILE, or POSE,PORT=FILE with more
     /// columns
     #[arg(long, value_name = "FILE")]
@@ -138,18 +144,18 @@ impl Job {
         if let Err(message) = self.options.reserve_output(shell) {
             return shell.refuse(message);
         }
-        let plan = match slow::compile(&self.request, shell) {
-            Ok(plan) => plan,
+        let (plan, request) = match slow::compile(&self.request, shell) {
+            Ok(compiled) => compiled,
             Err(code) => return code,
         };
-        self.run_plan(plan, shell).unwrap_or_else(|message| shell.refuse(message))
+        self.run_plan(plan, &request, shell).unwrap_or_else(|message| shell.refuse(message))
     }
 
     /// Runs a plan and returns the exit code.
     ///
     /// # Errors
     /// If the arguments do not fit the graph, before the run starts.
-    fn run_plan(&self, plan: Compiled, shell: &Shell) -> Result<u8, String> {
+    fn run_plan(&self, plan: Compiled, request: &Request, shell: &Shell) -> Result<u8, String> {
         plan.warnings().iter().for_each(|report| shell.show(report));
         let interrupt = Arc::new(Interrupt::catch().map_err(|error| format!("cannot run: {error}"))?);
         let JobOptions { duration, realtime, send, listen, points, .. } = &self.options;
@@ -163,7 +169,8 @@ impl Job {
         let silences = plan.silences().to_vec();
         let mut engine = Engine::new(plan);
         self.check_words(&engine)?;
-        let mut files = match OutputFiles::create(self, chosen.as_ref(), &engine, is_real, &interrupt, shell) {
+        let run = (request, is_real);
+        let mut files = match OutputFiles::create(self, chosen.as_ref(), &mut engine, run, &interrupt, shell) {
             Err(message) if interrupt.is_requested() => {
                 shell.error(message);
                 return Ok(INTERRUPTED);
@@ -199,6 +206,7 @@ impl Job {
             })
         });
         shell.set_patience(&patience.after_run());
+        files.end(&engine, &outcome);
         progress.clear();
         if let Ok(outcome) = &outcome {
             let style = PageStyle::new(shell.has_colour());

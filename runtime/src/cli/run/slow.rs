@@ -10,23 +10,25 @@ pub(super) fn fraction(text: &str) -> Result<f64, String> {
     number.ok_or_else(|| format!("`{text}` is not a number above 0 and up to 1, such as 0.1"))
 }
 
-/// Compiles a graph, slowly if it moves a real arm that is not commissioned and nobody asked for a speed.
+/// Compiles a graph, slowly if it moves a real arm that is not commissioned and nobody asked for a speed. Returns the
+/// request that was compiled.
 ///
 /// # Errors
 /// The exit code, after the mistakes are printed.
-pub(super) fn compile(request: &Request, shell: &Shell) -> Result<Compiled, u8> {
+pub(super) fn compile(request: &Request, shell: &Shell) -> Result<(Compiled, Request), u8> {
     let compiled = |request: &Request| graph::compile(shell.catalogue(), request).map_err(|r| shell.reject(&r));
     let plan = compiled(request)?;
     if request.slow.is_some() {
-        return Ok(plan);
+        return Ok((plan, request.clone()));
     }
     let missing = uncommissioned(&plan).map_err(|message| shell.refuse(message))?;
-    let Some((device, bench)) = missing.first() else { return Ok(plan) };
+    let Some((device, bench)) = missing.first() else { return Ok((plan, request.clone())) };
     shell.warning(format_args!(
         "device `{device}` has not passed `tactflow doctor {bench} --move`, so this run uses {UNCOMMISSIONED_FRACTION} of the limits of \
          speed and acceleration; `--slow 1` uses all of them"
     ));
-    compiled(&request.clone().slow(UNCOMMISSIONED_FRACTION))
+    let slow = request.clone().slow(UNCOMMISSIONED_FRACTION);
+    Ok((compiled(&slow)?, slow))
 }
 
 #[cfg(test)]

@@ -25,7 +25,7 @@ pub(crate) fn is_special(path: &Path) -> bool {
 /// Returns a message if the file cannot be created, or is of another sort, or if a signal ends the wait.
 pub(crate) fn open(
     path: &Path,
-    starts: &[&str],
+    starts: &[&[u8]],
     what: &str,
     interrupt: &Interrupt,
     shell: &Shell,
@@ -50,14 +50,14 @@ pub(crate) fn clear(path: &Path, file: &OutputFile) -> Result<(), String> {
 }
 
 /// Refuses to overwrite a file that does not begin like the output of a run, such as a recording that is being played.
-fn refuse_other(path: &Path, starts: &[&str], what: &str) -> Result<(), String> {
+fn refuse_other(path: &Path, starts: &[&[u8]], what: &str) -> Result<(), String> {
     // A pipe has nothing to overwrite, and reading it waits for its writer.
     if is_special(path) {
         return Ok(());
     }
     let mut start = Vec::new();
     let read = File::open(path).and_then(|file| file.take(16).read_to_end(&mut start));
-    if read.is_ok() && !start.is_empty() && !starts.iter().any(|known| start.starts_with(known.as_bytes())) {
+    if read.is_ok() && !start.is_empty() && !starts.iter().any(|known| start.starts_with(known)) {
         return Err(format!(
             "`{}` exists and is not {what}, so it is not overwritten: write to another file",
             path.display()

@@ -59,6 +59,10 @@ pub(crate) struct VerifyArgs {
     /// Record each run in this folder, as SCENARIO-SEED.csv
     #[arg(short, long, value_name = "DIR")]
     out: Option<PathBuf>,
+    /// Record each run whole in this folder, as SCENARIO-SEED.mcap
+    #[cfg(feature = "mcap")]
+    #[arg(long, value_name = "DIR", conflicts_with = "out")]
+    record: Option<PathBuf>,
     /// Same as `--format json`
     #[arg(long)]
     json: bool,
@@ -70,6 +74,15 @@ pub(crate) struct VerifyArgs {
 impl VerifyArgs {
     fn is_json(&self) -> bool {
         self.json || self.format == OutputFormat::Json
+    }
+
+    /// Returns the folder of the recordings, and the extension of their names.
+    fn records(&self) -> Option<(&Path, &'static str)> {
+        #[cfg(feature = "mcap")]
+        if let Some(folder) = &self.record {
+            return Some((folder, "mcap"));
+        }
+        self.out.as_deref().map(|folder| (folder, "csv"))
     }
 }
 
@@ -133,7 +146,7 @@ fn prepare(args: &VerifyArgs, catalogue: &Catalogue) -> Result<Vec<Verified>, St
         })
     };
     let all: Vec<Verified> = files.into_iter().flat_map(load).collect();
-    if let Some(folder) = &args.out {
+    if let Some((folder, _)) = args.records() {
         let mut names = BTreeSet::new();
         if let Some(twice) = all.iter().map(Verified::name).find(|name| !names.insert(name.clone())) {
             return Err(format!(
@@ -171,7 +184,7 @@ fn run(all: &mut [Verified], args: &VerifyArgs, shell: &Shell) -> Result<bool, S
     let one = |i: usize| {
         let (scenario, seed) = work[i];
         let verified = &all[scenario];
-        let record = args.out.as_deref().map(|folder| folder.join(record_name(&verified.name(), seed)));
+        let record = args.records().map(|(folder, end)| folder.join(record_name(&verified.name(), seed, end)));
         let scenario = verified.loaded.as_ref().ok()?;
         scenario.run(shell.catalogue(), seed, record.as_deref(), &|| interrupt.is_requested())
     };
@@ -218,7 +231,7 @@ fn in_parallel<T: Send + Sync>(
     results
 }
 
-fn record_name(scenario: &str, seed: Option<u64>) -> String {
+fn record_name(scenario: &str, seed: Option<u64>, end: &str) -> String {
     let scenario = scenario.replace(' ', "_");
-    seed.map_or_else(|| format!("{scenario}.csv"), |seed| format!("{scenario}-{seed}.csv"))
+    seed.map_or_else(|| format!("{scenario}.{end}"), |seed| format!("{scenario}-{seed}.{end}"))
 }

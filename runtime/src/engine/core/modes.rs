@@ -202,6 +202,11 @@ impl ModeMachine {
         self.modes[self.current].name.clone()
     }
 
+    /// Returns the names of all modes in the file of their task.
+    pub(crate) fn names(&self) -> impl Iterator<Item = &str> {
+        self.modes.iter().map(|mode| own_name(&mode.name))
+    }
+
     /// Returns the number of the current mode, from 0 in the order of the file.
     pub(crate) const fn number(&self) -> usize {
         self.current

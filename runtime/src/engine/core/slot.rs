@@ -18,6 +18,12 @@ pub(crate) struct DeviceSlot {
     pub(crate) pause: Duration,
     /// Number of writes in the samples when the driver was started.
     pub(crate) writes_at_start: u64,
+    /// Whether its commands were set to zero between two ticks, because its driver has ended.
+    pub(crate) has_rested: bool,
+    /// Whether a replayed device loses its lease in this tick, and why it refused the commands, if it did.
+    pub(crate) lease_lost: Option<Option<String>>,
+    /// Why it refused the commands when it lost its lease last.
+    pub(crate) refusal: Option<String>,
 }
 
 impl DeviceSlot {
@@ -34,6 +40,7 @@ impl DeviceSlot {
         self.samples.lose_all(why);
         // The device has come to rest by itself, or does so now.
         self.commands.rest();
+        self.has_rested = true;
         self.link = DeviceLink::Down(Instant::now() + pause);
     }
 
@@ -55,6 +62,8 @@ pub(crate) enum DeviceLink {
     Down(Instant),
     /// A device that has failed. The engine does not call it again.
     Gone,
+    /// A device of a recording, and whether it was live. A replay writes its samples.
+    Recorded { is_live: bool },
 }
 
 impl DeviceLink {

@@ -2,7 +2,6 @@
 
 use super::engine::Engine;
 use super::trouble::{Trouble, WatchedWire};
-use crate::device::Linked;
 use crate::fault::{Cause, Fault, StaleWire};
 
 impl Engine {
@@ -35,8 +34,7 @@ impl Engine {
             }
             Trouble::Lease(device) => {
                 let device = &self.devices[device];
-                let refusal = device.link.live().and_then(Linked::refusal);
-                let cause = refusal.map_or(Cause::LostLease, Cause::Refused);
+                let cause = device.refusal.clone().map_or(Cause::LostLease, Cause::Refused);
                 self.fault(&device.name, None, cause, device.place.clone())
             }
             Trouble::Lost(inlet) => {

@@ -35,7 +35,8 @@ impl BusPorts {
         for (i, role) in plan.roles.iter().enumerate() {
             for (port, planned) in role.ports.iter().enumerate() {
                 let id = ports.add(PortRef { producer: Producer::Role(i), port }, planned);
-                let is_live = matches!(plan.devices[role.device].driver, Driver::Live(_));
+                let driver = &plan.devices[role.device].driver;
+                let is_live = matches!(driver, Driver::Live(_) | Driver::Recorded { is_live: true });
                 let mut inlet = Inlet::new(i, role, port, id, is_live);
                 if plan.devices[role.device].description.may_return {
                     inlet.returns = behind(plan, PortRef { producer: Producer::Role(i), port }, planned);
@@ -87,7 +88,7 @@ impl Engine {
     /// Creates the engine of a compiled graph. Ticks do not allocate.
     #[must_use]
     pub fn new(compiled: Compiled) -> Self {
-        let Compiled { plan, view, sources, exports, .. } = compiled;
+        let Compiled { plan, view, sources, exports, recorded, .. } = compiled;
         let (mut ports, inlets) = BusPorts::of(&plan);
         let logged = plan.nodes.iter().filter(|node| node.is_logged).map(|node| logged(node, &ports)).collect();
         let place = |device: usize| sources.locate(plan.devices[device].span.start);
@@ -96,8 +97,7 @@ impl Engine {
         let mut owners: Vec<usize> = plan.nodes.iter().map(|node| node.task).collect();
         owners.retain(|_| plan.tasks.len() > 1);
         let writers = writers(&plan);
-        let mut device_roles = vec![Vec::new(); plan.devices.len()];
-        plan.roles.iter().enumerate().for_each(|(i, role)| device_roles[role.device].push(i));
+        let device_roles = device_roles(&plan);
         let limits = limits(&plan.nodes, &ports);
         let budgets = budgets(&plan.nodes, &ports);
         let failures = failures(&plan.nodes, &ports);
@@ -108,9 +108,7 @@ impl Engine {
         let devices = devices.map(|(i, device)| device_slot(i, device, &reports, &sources)).collect();
         let runners: Vec<NodeRunner> =
             plan.nodes.into_iter().enumerate().map(|node| runner(node, &mut ports, &mut watched)).collect();
-        let mut commanded: Vec<String> =
-            plan.commands.iter().filter(|wire| !wire.is_report).map(|wire| wire.name[0].clone()).collect();
-        commanded.dedup();
+        let commanded = commanded(&plan.commands);
         let commands = plan.commands.iter().filter(|wire| !wire.is_report);
         let drivers = commands.map(|wire| (wire.task, wire.tasks.clone())).collect();
         let (reports, commands): (Vec<_>, Vec<_>) = plan.commands.into_iter().partition(|wire| wire.is_report);
@@ -155,9 +153,27 @@ impl Engine {
             late: 0,
             lateness: None,
             punctuality: Punctuality::default(),
+            inputs: None,
+            recorded,
+            replayed: None,
             sources,
         }
     }
+}
+
+/// Returns the roles that each device fills.
+fn device_roles(plan: &Plan) -> Vec<Vec<usize>> {
+    let mut roles = vec![Vec::new(); plan.devices.len()];
+    plan.roles.iter().enumerate().for_each(|(i, role)| roles[role.device].push(i));
+    roles
+}
+
+/// Returns the roles that are commanded, each once.
+fn commanded(commands: &[PlannedCommand]) -> Vec<String> {
+    let mut roles: Vec<String> =
+        commands.iter().filter(|wire| !wire.is_report).map(|wire| wire.name[0].clone()).collect();
+    roles.dedup();
+    roles
 }
 
 /// Returns the shape of each wired report, by its device and its number there.
@@ -247,10 +263,14 @@ fn device_slot(
         link: match device.driver {
             Driver::Stepped(driver) | Driver::Lockstep(driver) => DeviceLink::Stepped(driver),
             Driver::Live(driver) => DeviceLink::Idle(driver),
+            Driver::Recorded { is_live } => DeviceLink::Recorded { is_live },
         },
         failed: None,
         pause: DeviceSlot::FIRST_PAUSE,
         writes_at_start: 0,
+        has_rested: false,
+        lease_lost: None,
+        refusal: None,
     }
 }
 

@@ -29,10 +29,20 @@ impl Engine {
     pub fn exchange(&mut self, now: i64) -> Result<(), Fault> {
         let due = self.clock_sample().is_some_and(|sample| sample <= now);
         self.core.begin(now);
-        if let Some(by) = self.lateness.take() {
+        let late = self.lateness.take();
+        if let Some(log) = &mut self.inputs {
+            log.begin(&self.core.tick, late);
+        }
+        if let Some(by) = late {
             self.raise(Origin::Run, |policy| policy.deadline, Trouble::Late(by))?;
         }
-        let has_sampled = self.exchange_with_devices(now) || due;
+        let has_sampled = match self.replayed.take() {
+            Some(has_sampled) => has_sampled,
+            None => self.exchange_with_devices(now) || due,
+        };
+        if let Some(log) = &mut self.inputs {
+            log.exchanged(&mut self.devices, has_sampled);
+        }
         self.check_sizes();
         for i in 0..self.devices.len() {
             if self.devices[i].failed.is_some() {
@@ -131,7 +141,7 @@ impl Engine {
     }
 
     /// Returns whether a trouble from there concerns a task.
-    fn concerns(&self, origin: Origin, task: usize) -> bool {
+    pub(super) fn concerns(&self, origin: Origin, task: usize) -> bool {
         let is_in = |tasks: Option<&Vec<usize>>| tasks.is_none_or(|tasks| tasks.contains(&task));
         match origin {
             _ if self.tasks.len() == 1 => true,
@@ -263,20 +273,6 @@ impl Engine {
         }
     }
 
-    /// Lets the devices of a task move again that have stopped by themselves.
-    fn renew_leases(&mut self, task: usize) {
-        for i in 0..self.devices.len() {
-            let concerns = self.concerns(Origin::Device(i), task);
-            let device = &mut self.devices[i];
-            if let DeviceLink::Live(linked) = &mut device.link
-                && concerns
-                && device.failed.is_none()
-            {
-                linked.renew();
-            }
-        }
-    }
-
     /// Whether a device has reported why its samples are missing, while the commands are held only for missing samples.
     fn explains_halt(&self, task: usize, trouble: Trouble) -> bool {
         let last = self.tasks[task].halts.list.last().filter(|halt| halt.until.is_none());
@@ -365,31 +361,6 @@ impl Engine {
         self.clock()?.link.stepped()?.next()
     }
 
-    /// Hands over the commands of this tick to the live devices, which follow them for a short time.
-    fn send_commands(&mut self) {
-        let (now, lease) = (self.core.tick.now, self.schedule.lease());
-        for device in &mut self.devices {
-            if let DeviceLink::Live(linked) = &mut device.link {
-                linked.send(&mut device.commands, now, lease);
-            }
-        }
-    }
-
-    /// Stops the tasks of every device that has stopped by itself, because the last tick was too long ago.
-    fn check_leases(&mut self, now: i64) -> Result<(), Fault> {
-        let lease = self.schedule.lease();
-        for i in 0..self.devices.len() {
-            let device = &mut self.devices[i];
-            let DeviceLink::Live(linked) = &mut device.link else { continue };
-            if linked.loses_lease(now, lease) {
-                // The device ramps by itself, so the graph starts again from rest.
-                device.commands.rest();
-                self.raise(Origin::Device(i), |_| Policy::Stop, Trouble::Lease(i))?;
-            }
-        }
-        Ok(())
-    }
-
     /// Exchanges commands and samples with every stepped device, and receives the samples of the live ones. A device that
     /// fails does not keep the others from their commands. Returns whether a live clock device has sampled.
     fn exchange_with_devices(&mut self, now: i64) -> bool {
@@ -414,7 +385,11 @@ impl Engine {
                     let is_newer = linked.receive(&mut device.samples);
                     has_sampled |= is_newer && self.schedule.is_clock(i);
                 }
-                DeviceLink::Idle(_) | DeviceLink::Live(_) | DeviceLink::Down(_) | DeviceLink::Gone => {}
+                DeviceLink::Idle(_)
+                | DeviceLink::Live(_)
+                | DeviceLink::Down(_)
+                | DeviceLink::Gone
+                | DeviceLink::Recorded { .. } => {}
             }
         }
         has_sampled

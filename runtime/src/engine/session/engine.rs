@@ -1,6 +1,7 @@
 //! The engine: the state of a running graph and its accessors.
 
 use super::halt::{Halt, Rest};
+use super::inputs::InputLog;
 use super::punctuality::Punctuality;
 use super::schedule::TickSchedule;
 use super::task_run::{TaskEnd, TaskRun};
@@ -8,7 +9,7 @@ use super::trouble::{WatchedBudget, WatchedFailure, WatchedWire};
 use crate::device::Report;
 use crate::engine::core::{Core, Counters, DeviceLink, DeviceSlot, ModeChange, Timing};
 use crate::fault::Fault;
-use crate::graph::{AllowedWarning, PlannedPort, Reach};
+use crate::graph::{AllowedWarning, PlannedPort, Reach, RecordedPorts};
 use crate::node::{Bus, PortId};
 use crate::signal::{Mark, Signal};
 use crate::source::{SourceMap, suggestion};
@@ -59,6 +60,12 @@ pub struct Engine {
     /// How late the next tick begins, if it is too late [ns].
     pub(super) lateness: Option<i64>,
     pub(super) punctuality: Punctuality,
+    /// What a recording of the whole run contains.
+    pub(super) recorded: RecordedPorts,
+    /// The inputs of the tick, if they are logged.
+    pub(super) inputs: Option<Box<InputLog>>,
+    /// Whether the clock device has sampled in a tick that is replayed.
+    pub(super) replayed: Option<bool>,
     pub(super) sources: SourceMap,
 }
 
@@ -352,6 +359,12 @@ impl Engine {
             let names = self.ports.iter().map(|(port, _)| port.name.as_str());
             panic!("there is no port `{name}`: {}", suggestion(name, names, "ports"))
         })
+    }
+
+    /// Returns what a recording of the whole run contains.
+    #[must_use]
+    pub const fn recorded_ports(&self) -> &RecordedPorts {
+        &self.recorded
     }
 
     /// Returns the sources of the graph.

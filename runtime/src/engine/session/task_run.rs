@@ -64,6 +64,11 @@ impl TaskRun {
         self.modes.as_ref().map(ModeMachine::number)
     }
 
+    /// Returns the names of its modes, in the order of the file.
+    pub fn mode_names(&self) -> impl Iterator<Item = &str> {
+        self.modes.iter().flat_map(ModeMachine::names)
+    }
+
     /// Returns the mode changes so far, the start mode first.
     #[must_use]
     pub fn changes(&self) -> Vec<ModeChange> {

@@ -27,6 +27,9 @@ impl Engine {
     /// Returns a message if no mode has a condition on the word, if the commands wait for `resume`, or if the trouble
     /// that stopped them is not over at `resume`.
     pub fn send(&mut self, word: &str) -> Result<(), String> {
+        if let Some(log) = &mut self.inputs {
+            log.word(word);
+        }
         let (to, bare) = self.addressee(word);
         let (mut is_done, mut refusal) = (false, None);
         for task in 0..self.tasks.len() {

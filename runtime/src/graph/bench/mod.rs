@@ -5,7 +5,9 @@ mod commissioning;
 mod facts;
 mod models;
 mod open;
+mod place;
 mod reconnect;
+mod recorded;
 mod sides;
 
 pub use all::{BenchDevice, OpenBench, open_bench};
@@ -13,4 +15,5 @@ pub use commissioning::CommissionedDevice;
 pub(crate) use commissioning::to_commission;
 pub(crate) use facts::fill_facts;
 pub(crate) use models::add_models;
-pub(crate) use open::{BoundRole, OpenedBench, open, place_mistakes};
+pub(crate) use open::{BoundRole, OpenedBench, open};
+pub(crate) use place::place_mistakes;

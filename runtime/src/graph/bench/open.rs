@@ -2,21 +2,19 @@
 
 use std::borrow::Cow;
 use std::collections::{BTreeMap, BTreeSet};
-use std::ops::Range;
 
+use super::place::place_mistakes;
 use super::reconnect::allow_return;
 use super::sides;
 use crate::catalogue::Catalogue;
-use crate::device::{Description, StatedPort};
+use crate::device::{Description, RecordedDevice, StatedPort};
 use crate::graph::load::MeasuredValues;
 use crate::graph::net::Net;
 use crate::graph::plan::PlannedDevice;
-use crate::graph::syntax::{BenchDocument, Binding, Block, WireEntry};
-use crate::node::{KnownUnits, Mistake, PortSpec, Reader, Spanned};
+use crate::graph::syntax::{BenchDocument, Binding, Block};
+use crate::node::{KnownUnits, PortSpec, Reader, Spanned};
 use crate::signal::Shape;
-use crate::source::{
-    Code, Diagnostic, Diagnostics, Edit, Item, Key, SourceMap, Value, quoted, suggest_name, suggestion,
-};
+use crate::source::{Code, Diagnostic, Diagnostics, Edit, Key, SourceMap, quoted, suggest_name, suggestion};
 
 /// A role that is bound to a device. Ports are in the order of the role, each with its index in the device.
 #[derive(Debug, Clone)]
@@ -70,10 +68,16 @@ impl OpenedBench {
     }
 }
 
-/// Opens the devices of all roles. Their joints move at most at `slow` times their speeds.
-pub(crate) fn open(net: &Net<'_>, slow: f64, sources: &mut SourceMap, diagnostics: &mut Diagnostics) -> OpenedBench {
+/// Opens the devices of all roles, or takes those of a recording. Their joints move at most at `slow` times their speeds.
+pub(crate) fn open(
+    net: &Net<'_>,
+    (slow, recorded): (f64, Option<&[RecordedDevice]>),
+    sources: &mut SourceMap,
+    diagnostics: &mut Diagnostics,
+) -> OpenedBench {
     let bench = net.flat.bench.as_ref();
     let mut opener = Opener::new(net.catalogue, bench, slow, sources, diagnostics);
+    opener.recorded = recorded;
     opener.kinds = net.flat.roles.iter().map(|(key, kind)| (key.name.clone(), kind.value.clone())).collect();
     let is_bound = |role: &&String| bench.is_none_or(|bench| bench.bind.position(role).is_some());
     opener.unbound = opener.kinds.keys().filter(|role| !is_bound(role)).cloned().collect();
@@ -81,7 +85,10 @@ pub(crate) fn open(net: &Net<'_>, slow: f64, sources: &mut SourceMap, diagnostic
         let declared = net.flat.roles.iter().map(|(key, _)| key);
         let roles = declared.chain(net.observed.iter().map(|(key, ..)| *key)).map(|key| key.name.as_str()).collect();
         opener.check_unused_bindings(bench, &roles);
-        opener.check_devices(bench, &roles);
+        // The types of recorded devices do not matter.
+        if recorded.is_none() {
+            opener.check_devices(bench, &roles);
+        }
     }
     for (i, (key, kind)) in net.flat.roles.iter().enumerate() {
         let role = match bench {
@@ -106,7 +113,7 @@ const PERIOD_RANGE_S: std::ops::RangeInclusive<f64> = 1e-6..=1e3;
 pub(super) struct Opener<'a> {
     catalogue: &'a Catalogue,
     sources: &'a mut SourceMap,
-    diagnostics: &'a mut Vec<Diagnostic>,
+    pub(super) diagnostics: &'a mut Vec<Diagnostic>,
     /// The blocks of the devices, by name.
     blocks: BTreeMap<&'a str, &'a Block>,
     /// Devices that were tried, by name: their index if they opened.
@@ -119,6 +126,8 @@ pub(super) struct Opener<'a> {
     unbound: Vec<String>,
     /// Fraction of the speeds of joints that is used.
     slow: f64,
+    /// The devices of a recording, which replace those of the bench.
+    recorded: Option<&'a [RecordedDevice]>,
     pub(super) opened: OpenedBench,
 }
 
@@ -142,6 +151,7 @@ impl<'a> Opener<'a> {
             kinds: BTreeMap::new(),
             unbound: Vec::new(),
             slow,
+            recorded: None,
             opened: OpenedBench::default(),
         }
     }
@@ -358,12 +368,16 @@ impl<'a> Opener<'a> {
             self.diagnostics.push(unknown_device(word, bench));
             return None;
         };
+        if let Some(recorded) = self.recorded {
+            return self.open_recorded(recorded, block);
+        }
         let kind = block.kind.as_ref()?;
         let device = self.catalogue.find_device(&kind.value)?;
         let specs = device.params();
         let mut reader = Reader::new(self.sources).with_units(KnownUnits::of_params(&block.params, &specs));
         let opened = device.open(&block.params, &mut reader);
-        let Reader { mistakes, warnings, measured, .. } = reader;
+        let Reader { mistakes, warnings, measured, files, .. } = reader;
+        self.sources.add_named(files);
         self.opened.measured.add(None, measured);
         let found = mistakes.into_iter().chain(warnings).collect();
         place_mistakes(found, &block.params, &[], self.sources, self.diagnostics);
@@ -386,7 +400,7 @@ impl<'a> Opener<'a> {
     }
 
     /// Reports where the ports of a device differ from those of its roles, and adds the reports that it does not read.
-    fn check_ports(&mut self, description: &mut Description, block: &Block) -> bool {
+    pub(super) fn check_ports(&mut self, description: &mut Description, block: &Block) -> bool {
         let before = self.diagnostics.len();
         let wrong = |message: String| {
             let kind = block.kind.as_ref().map_or("", |kind| &kind.value);
@@ -428,73 +442,4 @@ fn unknown_device(word: &Spanned<String>, bench: &BenchDocument) -> Diagnostic {
     let message = format!("the bench has no device `{}`", word.value);
     let known = bench.devices.iter().map(|device| device.key.name.as_str());
     Diagnostic::new(Code::UnknownDevice, word.span.clone(), message).suggest(&word.value, known, "devices")
-}
-
-/// Converts the mistakes of a node or device into diagnostics, with spans in its block, its wires or a data file.
-pub(crate) fn place_mistakes(
-    mistakes: Vec<Mistake>,
-    block: &Value,
-    wires: &[WireEntry],
-    sources: &mut SourceMap,
-    diagnostics: &mut Diagnostics,
-) {
-    use crate::node::At;
-    for Mistake { code, at, message, help, instead } in mistakes {
-        let mut notes = Vec::new();
-        let span = match at {
-            At::Span(span) => span,
-            At::Node => block.span.clone(),
-            At::Param(path) => find_spans(block, &path).map_or(block.span.clone(), |(_, value)| value),
-            At::Key(path) => find_spans(block, &path).map_or(block.span.clone(), |(key, _)| key),
-            At::Input(name) => {
-                wires.iter().find(|wire| wire.key.name == name).map_or(&block.span, |wire| &wire.from.span).clone()
-            }
-            At::Data { file, text, span } => {
-                notes.push((file.span.clone(), "the file is named here".to_owned()));
-                let base = sources.add_file(&file.path, &*text).base;
-                base + span.start..base + span.end
-            }
-        };
-        let diagnostic = Diagnostic { notes, ..Diagnostic::new(code, span, message).with_help(help) };
-        diagnostics.push(match instead {
-            Some(names) => misspelt_wire(&diagnostic, wires, (&names.0, &names.1), sources).unwrap_or_else(|| {
-                let help = diagnostic.help.clone();
-                diagnostic.instead(&names.0, &names.1).with_help(help)
-            }),
-            None => diagnostic,
-        });
-    }
-}
-
-/// Returns the diagnostic of a wire whose name, which is `best`, is misspelt, and not the `name` that a parameter has.
-fn misspelt_wire(
-    diagnostic: &Diagnostic,
-    wires: &[WireEntry],
-    (name, best): (&str, &str),
-    sources: &SourceMap,
-) -> Option<Diagnostic> {
-    let wire = wires.iter().find(|wire| wire.key.name == best)?;
-    let is_rarer = sources.occurrences(best) == 1 && sources.occurrences(name) > 1;
-    let message = format!("the parameters name `{name}`, and no wire is called so");
-    let wrong = Diagnostic::new(Code::UnknownInput, wire.key.span.clone(), message);
-    is_rarer.then(|| wrong.note(diagnostic.span.clone(), "it is named here").instead(best, name))
-}
-
-/// Returns the spans of the key and of the value at a dotted path. An entry of a list is named by its number, from 0.
-fn find_spans(block: &Value, path: &str) -> Option<(Range<usize>, Range<usize>)> {
-    let mut value = block;
-    let mut key = block.span.clone();
-    for name in path.split('.') {
-        (key, value) = match &value.item {
-            Item::Array(items) => {
-                let item = items.get(name.parse::<usize>().ok()?)?;
-                (item.span.clone(), item)
-            }
-            _ => {
-                let (entry_key, inner) = value.as_table()?.entry(name)?;
-                (entry_key.span.clone(), inner)
-            }
-        };
-    }
-    Some((key, value.span.clone()))
 }

@@ -34,7 +34,8 @@ impl Builder<'_> {
         let period = self.opened.shortest_period(self.net.roles_of(Producer::Node(index))).unwrap_or(self.period);
         let mut reader = Reader::new(&self.sources).with_units(units).with_period(period);
         let configured = self.net.catalogue.nodes()[kind].configure(&params, &mut reader);
-        let Reader { mistakes, warnings, measured, .. } = reader;
+        let Reader { mistakes, warnings, measured, files, .. } = reader;
+        self.sources.add_named(files);
         self.measured.add(Some(index), measured);
         let is_valid = mistakes.is_empty();
         let place = |mistake| self.at_wire(self.at_reference(mistake, written), index);

@@ -30,6 +30,7 @@ pub(crate) mod parts;
 pub(crate) mod policy;
 pub(crate) mod quantities;
 pub(crate) mod reachability;
+pub(crate) mod record;
 mod second_guard;
 pub(crate) mod silence;
 mod sums;

@@ -5,7 +5,8 @@ use std::ops::Range;
 
 use super::task::Task;
 use crate::graph::syntax::{
-    Allowance, BenchDocument, Block, CommandEntry, LimitOwner, LimitSection, ModeBlock, PolicyTable, WireEntry,
+    Allowance, BenchDocument, Block, CommandEntry, LimitOwner, LimitSection, ModeBlock, PolicyTable, RecordTable,
+    WireEntry,
 };
 use crate::node::Spanned;
 use crate::source::{Key, Named, Value};
@@ -66,6 +67,8 @@ pub(crate) struct FlatGraph {
     pub(crate) modes: Vec<ModeBlock>,
     pub(crate) bench: Option<BenchDocument>,
     pub(crate) allow: Vec<Allowance>,
+    /// What a recording contains.
+    pub(crate) record: Option<RecordTable>,
 }
 
 impl FlatGraph {

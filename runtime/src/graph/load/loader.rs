@@ -64,6 +64,7 @@ impl Loader {
         }
         root.0.merge(graph_set);
         let mut document = self.sections(|sections| sections.graph(&mut root.0));
+        flat.record = self.sections(|sections| sections.record(&root.0));
         if document.graph.is_none() {
             let message = "the graph has no section [graph]";
             let help = "write a section [graph] with `clock = \"role\"` or `rate_hz = 250`, and a `bench`";
@@ -94,7 +95,8 @@ impl Loader {
     pub(super) fn sections<T>(&mut self, read: impl FnOnce(&mut Sections<'_>) -> T) -> T {
         let mut sections = Sections::new(&self.sources);
         let result = read(&mut sections);
-        let (diagnostics, measured) = sections.finish();
+        let (diagnostics, measured, files) = sections.finish();
+        self.sources.add_named(files);
         self.diagnostics.extend(diagnostics);
         self.measured.add(None, measured);
         result
@@ -193,7 +195,7 @@ impl Loader {
     /// Reads and parses a file; `from` is the span of its name.
     pub(crate) fn read(&mut self, path: &Path, from: Option<Range<usize>>) -> Option<(Table, Range<usize>)> {
         let text = match self.sources.builtin(path) {
-            Ok(Some(bytes)) => Ok(String::from_utf8_lossy(bytes).into_owned()),
+            Ok(Some(bytes)) => Ok(String::from_utf8_lossy(&bytes).into_owned()),
             Ok(None) => std::fs::read_to_string(path).map_err(|error| (error.to_string(), None)),
             Err(unknown) => Err((unknown.message, Some(unknown.help))),
         };

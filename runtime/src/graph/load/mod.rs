@@ -12,5 +12,5 @@ mod tasks;
 pub(crate) use flat::{Entity, FlatGraph, FlatNode, Scope};
 pub(crate) use loader::{Loader, wrong_file_type};
 pub(crate) use measured::MeasuredValues;
-pub use request::Request;
+pub use request::{RecordedGraph, Request};
 pub(crate) use task::Task;

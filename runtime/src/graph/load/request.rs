@@ -1,6 +1,10 @@
 //! Which graph to load, on which bench, and with which changes.
 
 use std::path::PathBuf;
+use std::sync::Arc;
+
+use crate::device::RecordedDevice;
+use crate::source::AttachedFiles;
 
 /// Which graph to load, and what to change in it.
 #[derive(Debug, Clone, Default)]
@@ -18,6 +22,17 @@ pub struct Request {
     pub set: Vec<String>,
     /// Fraction of the limits of speed and acceleration that is used, of the joints as well; `None` for all of it.
     pub slow: Option<f64>,
+    /// What a recording provides instead of devices and files.
+    pub recorded: Option<Arc<RecordedGraph>>,
+}
+
+/// What a recording provides for a replay.
+#[derive(Debug, Clone, Default)]
+pub struct RecordedGraph {
+    /// The devices that stand for those of the bench.
+    pub devices: Vec<RecordedDevice>,
+    /// The files that are read instead of those on the disk and in the catalogue; `None` for another graph.
+    pub files: Option<Arc<AttachedFiles>>,
 }
 
 impl Request {

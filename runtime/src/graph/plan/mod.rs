@@ -2,6 +2,7 @@
 
 mod modes;
 mod port;
+mod record;
 mod tasks;
 mod view;
 
@@ -17,6 +18,8 @@ use crate::source::Code;
 pub(crate) use modes::{Condition, PlannedExit, PlannedMode, PlannedModes, Test, WatchedPort};
 pub use port::PlannedPort;
 pub(crate) use port::{PortRef, Producer};
+pub use record::RecordedPorts;
+pub(crate) use record::matches;
 pub(crate) use tasks::{PlannedTask, Reach};
 pub(crate) use view::{PlannedShow, PlannedView};
 

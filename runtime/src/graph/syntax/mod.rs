@@ -9,6 +9,7 @@ mod modes;
 mod names;
 mod policy;
 mod read;
+mod record;
 mod reserved;
 mod roles;
 mod sections;
@@ -20,6 +21,7 @@ pub(crate) use modes::{ExitKind, ExitTable, ModeBlock, ModeExit, PortState};
 pub(crate) use names::Use;
 pub use policy::Policy;
 pub(crate) use policy::{AgeLimit, OnFail, PolicyTable, default_max_age_ns, default_max_age_s};
+pub(crate) use record::RecordTable;
 pub(crate) use reserved::{ALLOW_UNCALIBRATED, INPUTS, LIMITS, MODES, NO_ARM, ROBOT, SENSOR, TASK_SECTIONS};
 pub(crate) use sections::{
     BenchDocument, Block, CommandEntry, GraphDocument, GraphTable, PartBlock, Sections, WireEntry, into_diagnostic,

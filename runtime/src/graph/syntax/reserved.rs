@@ -17,7 +17,7 @@ pub(super) const ALLOW: &str = "allow";
 pub(crate) const ALLOW_UNCALIBRATED: &str = "allow_uncalibrated";
 
 /// The sections of a graph file.
-pub(super) const GRAPH_SECTIONS: [&str; 13] = [
+pub(super) const GRAPH_SECTIONS: [&str; 14] = [
     "graph",
     "roles",
     "parts",
@@ -26,6 +26,7 @@ pub(super) const GRAPH_SECTIONS: [&str; 13] = [
     LIMITS,
     "modes",
     "policy",
+    "record",
     "devices",
     "bind",
     "facts",

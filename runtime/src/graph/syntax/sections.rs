@@ -2,6 +2,7 @@
 
 use std::collections::BTreeSet;
 use std::ops::Range;
+use std::path::PathBuf;
 
 use super::allow::{Allowance, read_allow};
 use super::binding::Binding;
@@ -14,8 +15,7 @@ use super::model::{ModelDocument, ModelFile, read_model};
 use super::modes::{ModeBlock, read_mode};
 use super::policy::{AgeLimit, OnFail, PolicyTable, WireTable};
 use super::read::read_table;
-use super::reserved::ALLOW;
-use super::reserved::{ALLOW_UNCALIBRATED, GRAPH_SECTIONS, LIMITS, MODELS, is_name};
+use super::reserved::{ALLOW, ALLOW_UNCALIBRATED, GRAPH_SECTIONS, LIMITS, MODELS, is_name};
 use crate::node::{At, FilePath, Measured, Mistake, Param, Reader, Spanned};
 use crate::source::{Code, Diagnostic, Diagnostics, Item, Key, Named, SourceMap, Table, Value, suggest_name};
 
@@ -192,12 +192,12 @@ impl<'a> Sections<'a> {
         Self { reader: Reader::new(sources), diagnostics: Vec::new(), broken: Vec::new() }
     }
 
-    /// Returns all diagnostics, and the values that were written with a unit.
-    pub(crate) fn finish(self) -> (Diagnostics, Measured) {
+    /// Returns all diagnostics, the values that were written with a unit, and the files that are named.
+    pub(crate) fn finish(self) -> (Diagnostics, Measured, Vec<PathBuf>) {
         let mut diagnostics = self.diagnostics;
-        let Reader { mistakes, warnings, measured, .. } = self.reader;
+        let Reader { mistakes, warnings, measured, files, .. } = self.reader;
         diagnostics.extend(mistakes.into_iter().chain(warnings).map(into_diagnostic));
-        (diagnostics, measured)
+        (diagnostics, measured, files)
     }
 
     /// Reads the sections of a graph file.

@@ -25,7 +25,7 @@ pub(crate) fn inject(compiled: &mut Compiled, injections: &[Injection], seed: u6
             Driver::Stepped(inner) => Driver::Stepped(wrap(inner)),
             Driver::Lockstep(inner) => Driver::Lockstep(wrap(inner)),
             // A scenario refuses a bench with such a device.
-            live @ Driver::Live(_) => live,
+            other @ (Driver::Live(_) | Driver::Recorded { .. }) => other,
         };
     }
 }

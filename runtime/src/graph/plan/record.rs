@@ -1,0 +1,60 @@
+//! What a recording of a whole run contains, from the section [record]. The inputs are in every recording.
+
+use super::PlannedPort;
+use crate::signal::Kind;
+
+/// The ports of a recording, and the size of its files.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct RecordedPorts {
+    /// Patterns of names, of which one must match: `*` stands for any text. `None` for all ports.
+    pub patterns: Option<Vec<String>>,
+    /// Whether images and masks are recorded.
+    pub has_images: bool,
+    /// Size at which another file is begun [byte].
+    pub max_bytes: Option<u64>,
+}
+
+impl Default for RecordedPorts {
+    fn default() -> Self {
+        Self { patterns: None, has_images: true, max_bytes: None }
+    }
+}
+
+impl RecordedPorts {
+    /// Whether a port is recorded.
+    #[must_use]
+    pub fn has(&self, port: &PlannedPort) -> bool {
+        let is_image = matches!(port.shape.kind(), Kind::Image | Kind::Mask);
+        let is_selected = |patterns: &Vec<String>| patterns.iter().any(|pattern| matches(pattern, &port.name));
+        (self.has_images || !is_image) && self.patterns.as_ref().is_none_or(is_selected)
+    }
+}
+
+/// Whether a name matches a pattern, in which `*` stands for any text.
+pub(crate) fn matches(pattern: &str, name: &str) -> bool {
+    let Some((start, rest)) = pattern.split_once('*') else { return pattern == name };
+    let Some(name) = name.strip_prefix(start) else { return false };
+    (0..=name.len()).filter(|end| name.is_char_boundary(*end)).any(|end| matches(rest, &name[end..]))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_star_stands_for_any_text() {
+        let cases = [
+            ("pad.image", "pad.image", true),
+            ("pad.image", "pad.image2", false),
+            ("touch.*", "touch.x", true),
+            ("touch.*", "touch.smooth.x", true),
+            ("*.x", "touch.smooth.x", true),
+            ("*.x", "touch.y", false),
+            ("t*h.*", "touch.x", true),
+            ("*", "", true),
+        ];
+        for (pattern, name, does) in cases {
+            assert_eq!(matches(pattern, name), does, "{pattern} {name}");
+        }
+    }
+}

@@ -1,0 +1,278 @@
+//! Reads a recording from its start, record by record. A file that was cut is read up to the cut.
+
+use std::collections::BTreeMap;
+use std::fs::File;
+use std::io::{BufReader, Read};
+use std::path::{Path, PathBuf};
+
+use mcap::McapError;
+use mcap::records::{Channel, Record, op};
+use mcap::sans_io::linear_reader::{LinearReadEvent, LinearReader, LinearReaderOptions};
+
+use super::about::{Contents, RunAbout};
+use super::channels::{INPUTS, INPUTS_ENCODING, KIND_KEY, MISSING, PORT_KEY, UNITS_KEY};
+use super::writer::{ABOUT, END, MODES_KEY, NEXT, NEXT_FILE};
+
+/// Longest record that is read [bytes].
+const MAX_RECORD: usize = 1 << 30;
+/// Size of the buffer [bytes].
+const BUFFER_BYTES: usize = 1 << 20;
+
+/// The records of a file, in their order.
+pub(super) struct Records {
+    path: PathBuf,
+    file: BufReader<File>,
+    reader: LinearReader,
+    /// Whether the file has ended as a whole file does.
+    is_complete: bool,
+    is_over: bool,
+}
+
+impl Records {
+    /// Opens a file.
+    ///
+    /// # Errors
+    /// If it cannot be opened.
+    pub(super) fn open(path: &Path) -> Result<Self, String> {
+        let file = File::open(path).map_err(|error| format!("cannot open `{}`: {error}", path.display()))?;
+        let options = LinearReaderOptions::default()
+            .with_skip_end_magic(true)
+            .with_validate_chunk_crcs(true)
+            .with_record_length_limit(MAX_RECORD);
+        let (file, reader) = (BufReader::with_capacity(BUFFER_BYTES, file), LinearReader::new_with_options(options));
+        Ok(Self { path: path.to_owned(), file, reader, is_complete: false, is_over: false })
+    }
+
+    /// Passes the next record of the data to `take`, and returns what it makes of it. `None` at the end of the data or at
+    /// the place where the file was cut.
+    ///
+    /// # Errors
+    /// If the file is no MCAP file, or is damaged.
+    pub(super) fn next<T>(&mut self, take: impl FnOnce(Record<'_>) -> T) -> Result<Option<T>, String> {
+        while !self.is_over {
+            let event = match self.reader.next_event() {
+                None | Some(Err(McapError::UnexpectedEof)) => break,
+                Some(Err(error)) => return Err(self.damaged(&error)),
+                Some(Ok(event)) => event,
+            };
+            match event {
+                LinearReadEvent::ReadRequest(need) => {
+                    let read = self.file.read(self.reader.insert(need));
+                    let read = read.map_err(|error| format!("cannot read `{}`: {error}", self.path.display()))?;
+                    self.reader.notify_read(read);
+                }
+                LinearReadEvent::Record { opcode: op::DATA_END, .. } => {
+                    self.is_complete = true;
+                    break;
+                }
+                LinearReadEvent::Record { opcode, data } => match mcap::parse_record(opcode, data) {
+                    Ok(record) => return Ok(Some(take(record))),
+                    Err(error) => return Err(self.damaged(&error)),
+                },
+            }
+        }
+        self.is_over = true;
+        Ok(None)
+    }
+
+    fn damaged(&self, error: &McapError) -> String {
+        let path = self.path.display();
+        match error {
+            McapError::BadMagic => format!("`{path}` is no MCAP file"),
+            error => format!("`{path}` is damaged: {error}"),
+        }
+    }
+
+    /// Whether the end of the data was found.
+    pub(super) const fn is_complete(&self) -> bool {
+        self.is_complete
+    }
+}
+
+/// A channel of a recording.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct RecordedChannel {
+    /// Its topic.
+    pub topic: String,
+    /// Name of its port, if it is that of a port.
+    pub port: Option<String>,
+    /// Name of the kind of its port.
+    pub kind: String,
+    /// Name and unit of each scalar of its port, in the order of its columns; an image has one without a name.
+    pub units: Vec<(String, String)>,
+}
+
+impl RecordedChannel {
+    fn of(channel: Channel) -> Self {
+        let Channel { topic, mut metadata, .. } = channel;
+        let units = metadata.get(UNITS_KEY).and_then(|units| serde_json::from_str(units).ok()).unwrap_or_default();
+        let kind = metadata.remove(KIND_KEY).unwrap_or_default();
+        Self { topic, port: metadata.remove(PORT_KEY), kind, units }
+    }
+
+    /// Whether it is that of an image or a mask.
+    #[must_use]
+    pub fn is_image(&self) -> bool {
+        matches!(self.kind.as_str(), "image" | "mask")
+    }
+
+    /// Returns the name of its port, or its topic.
+    #[must_use]
+    pub fn name(&self) -> &str {
+        self.port.as_deref().unwrap_or(&self.topic)
+    }
+}
+
+/// A tick of a recording.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub struct RecordedTick {
+    /// Its number, as far as 32 bits hold it.
+    pub number: u32,
+    /// Its time in the file [ns].
+    pub time: u64,
+    /// Its inputs.
+    pub inputs: Vec<u8>,
+    /// Whether its ports are missing.
+    pub is_missing: bool,
+    /// The other messages: the number of the channel, the time of the sample in the file [ns], and the JSON.
+    pub messages: Vec<(u16, u64, Vec<u8>)>,
+}
+
+/// A recording that is being read.
+pub struct Recording {
+    path: PathBuf,
+    records: Records,
+    contents: Contents,
+    channels: BTreeMap<u16, RecordedChannel>,
+    /// The tick whose messages are read.
+    tick: Option<RecordedTick>,
+    /// The metadata of the file, by its name.
+    metadata: BTreeMap<String, BTreeMap<String, String>>,
+}
+
+impl Recording {
+    /// Opens a recording, and reads everything before its first tick.
+    ///
+    /// # Errors
+    /// If it cannot be read, or was cut before the first tick.
+    pub fn open(path: &Path) -> Result<Self, String> {
+        let (records, contents, channels) = (Records::open(path)?, Contents::default(), BTreeMap::new());
+        let metadata = BTreeMap::new();
+        let mut recording = Self { path: path.to_owned(), records, contents, channels, tick: None, metadata };
+        recording.read()?;
+        if recording.contents.about == RunAbout::default() {
+            return Err(format!("`{}` is no recording of tactflow, or was cut at its start", path.display()));
+        }
+        Ok(recording)
+    }
+
+    /// Reads up to the next message of inputs. Returns the tick before it.
+    fn read(&mut self) -> Result<Option<RecordedTick>, String> {
+        loop {
+            let Self { records, contents, channels, tick, metadata, .. } = self;
+            let read = records.next(|record| take(record, contents, channels, tick, metadata))?;
+            match read {
+                None if self.records.is_complete() && self.metadata.contains_key(NEXT) => self.open_next()?,
+                None => return Ok(self.tick.take()),
+                Some(Err(message)) => return Err(format!("`{}`: {message}", self.path.display())),
+                Some(Ok(None)) => {}
+                Some(Ok(Some(next))) => {
+                    let last = self.tick.replace(next);
+                    return Ok(last);
+                }
+            }
+        }
+    }
+
+    /// Goes on with the file that the last one names.
+    fn open_next(&mut self) -> Result<(), String> {
+        let next = self.metadata.remove(NEXT).unwrap_or_default();
+        let path = self.path.with_file_name(next.get(NEXT_FILE).map_or("", String::as_str));
+        self.records = Records::open(&path).map_err(|why| format!("the recording goes on in another file: {why}"))?;
+        Ok(())
+    }
+
+    /// Returns the next tick with all its messages, or `None` after the last one.
+    ///
+    /// # Errors
+    /// If the file is damaged.
+    pub fn next_tick(&mut self) -> Result<Option<RecordedTick>, String> {
+        self.read()
+    }
+
+    /// Which graph ran, and with which options.
+    #[must_use]
+    pub const fn about(&self) -> &RunAbout {
+        &self.contents.about
+    }
+
+    pub(super) const fn contents(&self) -> &Contents {
+        &self.contents
+    }
+
+    /// Returns the channels by their numbers.
+    #[must_use]
+    pub const fn channels(&self) -> &BTreeMap<u16, RecordedChannel> {
+        &self.channels
+    }
+
+    /// Whether the file ends as a whole file does. Known after the last tick.
+    #[must_use]
+    pub const fn is_complete(&self) -> bool {
+        self.records.is_complete()
+    }
+
+    /// Returns why the run ended. Known after the last tick; `None` if the file was cut.
+    #[must_use]
+    pub fn reason(&self) -> Option<&str> {
+        self.metadata.get(END)?.get("reason").map(String::as_str)
+    }
+
+    /// Returns the names of the modes of each task that has modes, in the order of its file.
+    #[must_use]
+    pub fn modes(&self) -> Vec<(String, Vec<String>)> {
+        let modes = self.metadata.get(ABOUT).and_then(|about| about.get(MODES_KEY));
+        modes.and_then(|modes| serde_json::from_str(modes).ok()).unwrap_or_default()
+    }
+
+    /// Returns the path of the file.
+    #[must_use]
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+}
+
+/// Takes a record. Returns the tick that it begins, if it does.
+fn take(
+    record: Record<'_>,
+    contents: &mut Contents,
+    channels: &mut BTreeMap<u16, RecordedChannel>,
+    tick: &mut Option<RecordedTick>,
+    metadata: &mut BTreeMap<String, BTreeMap<String, String>>,
+) -> Result<Option<RecordedTick>, String> {
+    match record {
+        Record::Attachment { header, data, .. } => contents.add(&header.name, data.into_owned())?,
+        Record::Channel(channel) => {
+            if channel.topic == INPUTS && channel.message_encoding != INPUTS_ENCODING {
+                let encoding = channel.message_encoding;
+                return Err(format!("it has inputs of another version of tactflow, encoded as `{encoding}`"));
+            }
+            channels.insert(channel.id, RecordedChannel::of(channel));
+        }
+        Record::Metadata(read) => drop(metadata.insert(read.name, read.metadata)),
+        Record::Message { header, data } => {
+            let topic = channels.get(&header.channel_id).map_or("", |channel| &channel.topic);
+            match (topic, tick) {
+                (INPUTS, _) => {
+                    let (number, time, inputs) = (header.sequence, header.log_time, data.into_owned());
+                    return Ok(Some(RecordedTick { number, time, inputs, ..RecordedTick::default() }));
+                }
+                (MISSING, Some(tick)) => tick.is_missing = true,
+                (_, Some(tick)) => tick.messages.push((header.channel_id, header.publish_time, data.into_owned())),
+                (_, None) => {}
+            }
+        }
+        _ => {}
+    }
+    Ok(None)
+}
