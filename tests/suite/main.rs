@@ -73,6 +73,7 @@ mod record;
 mod recordings;
 mod reference;
 mod replay;
+mod report;
 mod reports;
 mod resume;
 mod robots;

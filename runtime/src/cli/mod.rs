@@ -19,6 +19,8 @@ mod explain;
 #[cfg(feature = "mcap")]
 mod recorded;
 mod reference;
+#[cfg(feature = "mcap")]
+mod report;
 mod run;
 mod shell;
 mod show;
@@ -90,7 +92,7 @@ impl Tool {
             ],
         };
         #[cfg(feature = "mcap")]
-        let tool = recorded::commands().into_iter().fold(tool, Self::command);
+        let tool = recorded::commands().into_iter().fold(tool, Self::command).command(derived(report::report));
         tool
     }
 

@@ -11,7 +11,7 @@ use super::snapshot::Snapshot;
 use crate::catalogue::Catalogue;
 use crate::engine::Engine;
 use crate::fault::Fault;
-use crate::graph::{PlannedPort, RecordedGraph, Request, compile};
+use crate::graph::{Outline, PlannedPort, RecordedGraph, Request, compile};
 use crate::source::Report;
 
 /// What a replay changes.
@@ -50,6 +50,7 @@ impl From<String> for ReplayError {
 /// A replay of a recording.
 pub struct Replay {
     recording: Recording,
+    outline: Outline,
     engine: Engine,
     snapshot: Snapshot,
     channels: Channels,
@@ -83,6 +84,7 @@ impl Replay {
         let mut recording = Recording::open(path)?;
         let request = request(&recording, changes)?;
         let compiled = compile(catalogue, &request).map_err(ReplayError::Graph)?;
+        let outline = compiled.outline().clone();
         let engine = Engine::new(compiled);
         let expected: Vec<&str> = recording.contents().devices.iter().map(|device| device.name.as_str()).collect();
         let found = engine.recorded_devices();
@@ -101,7 +103,7 @@ impl Replay {
         let ports = snapshot.ports();
         let (epoch, ticks, differences) = (0, 0, Differences::default());
         let mut replay =
-            Self { recording, engine, snapshot, channels, epoch, next, missing, ports, ticks, differences };
+            Self { recording, outline, engine, snapshot, channels, epoch, next, missing, ports, ticks, differences };
         replay.epoch = replay.epoch_of_file();
         Ok(replay)
     }
@@ -169,6 +171,12 @@ impl Replay {
     #[must_use]
     pub const fn engine(&self) -> &Engine {
         &self.engine
+    }
+
+    /// Returns the outline of the graph that runs.
+    #[must_use]
+    pub const fn outline(&self) -> &Outline {
+        &self.outline
     }
 
     /// Returns the recording.

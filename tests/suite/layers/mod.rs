@@ -48,6 +48,7 @@ const RUNTIME: &[&str] = &[
     "cli/draw",
     "cli/recorded",
     "cli/verify",
+    "cli/report",
     "cli/reference",
     "cli",
 ];

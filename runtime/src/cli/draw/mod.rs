@@ -14,7 +14,7 @@ use clap::ValueEnum;
 
 use super::shell::Shell;
 use super::shell::command::GraphArgs;
-use crate::graph::compile;
+use crate::graph::{Outline, PlannedPort, compile};
 
 /// Draw a graph: its roles, nodes and wires, with parts as boxes, or its modes
 #[derive(clap::Parser)]
@@ -54,6 +54,20 @@ enum DrawFormat {
     Dot,
 }
 
+/// Returns the picture of a graph with these ports, as SVG.
+pub(crate) fn graph_svg<'p>(
+    outline: &'p Outline,
+    ports: impl Iterator<Item = &'p PlannedPort>,
+    title: String,
+) -> String {
+    svg::text(&wires::picture(outline, ports, title))
+}
+
+/// Returns the picture of the modes of a graph, as SVG.
+pub(crate) fn modes_svg(outline: &Outline, title: String) -> String {
+    svg::text(&modes::picture(outline, title))
+}
+
 pub(crate) fn draw(args: DrawArgs, shell: &Shell) -> u8 {
     let plan = match compile(shell.catalogue(), &args.graph_args.request(args.graph.clone())) {
         Ok(plan) => plan,
@@ -63,7 +77,7 @@ pub(crate) fn draw(args: DrawArgs, shell: &Shell) -> u8 {
     let mut picture = match args.modes {
         true if plan.outline().modes.is_empty() => return shell.refuse("the graph has no modes to draw"),
         true => modes::picture(plan.outline(), title),
-        false => wires::picture(&plan, title),
+        false => wires::picture(plan.outline(), plan.ports(), title),
     };
     if args.plain {
         picture.arrows.iter_mut().for_each(|arrow| arrow.lines.clear());

@@ -3,13 +3,16 @@
 use std::collections::HashMap;
 
 use super::picture::{Look, Picture};
-use crate::graph::{Compiled, Outline, OutlinedWire, PlannedPort};
+use crate::graph::{Outline, OutlinedWire, PlannedPort};
 use crate::signal::Shape;
 
 /// Returns the picture of a graph as it runs. A role that is read and commanded has a box for each.
-pub(super) fn picture(plan: &Compiled, title: String) -> Picture {
-    let outline = plan.outline();
-    let ports = plan.ports().map(|port| (port.name.as_str(), port)).collect();
+pub(super) fn picture<'p>(
+    outline: &'p Outline,
+    ports: impl Iterator<Item = &'p PlannedPort>,
+    title: String,
+) -> Picture {
+    let ports = ports.map(|port| (port.name.as_str(), port)).collect();
     let mut drawing = Drawing { picture: Picture::new(title), outline, ports, sources: HashMap::new() };
     let mut nodes = Vec::new();
     for node in &outline.nodes {

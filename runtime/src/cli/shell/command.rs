@@ -93,9 +93,10 @@ impl GraphArgs {
 }
 
 /// Output for a person or for a program.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, ValueEnum)]
 pub enum OutputFormat {
     /// For a person.
+    #[default]
     Text,
     /// For a program.
     Json,

@@ -45,13 +45,17 @@ impl Still {
         self.view.add(engine);
     }
 
+    /// Returns the picture as a document.
+    pub(crate) fn text(&self, engine: &Engine) -> String {
+        draw(&self.title, &self.view, &engine.changes())
+    }
+
     /// Writes the picture to `file`. Waits while `goes_on` returns true for the number of bytes that have been written.
     ///
     /// # Errors
     /// If it cannot be written.
     pub(crate) fn finish(self, engine: &Engine, file: OutputFile, goes_on: impl FnMut(u64) -> bool) -> io::Result<()> {
-        let text = draw(&self.title, &self.view, &engine.changes());
-        write_whole(file, text.into_bytes(), goes_on)
+        write_whole(file, self.text(engine).into_bytes(), goes_on)
     }
 }
 

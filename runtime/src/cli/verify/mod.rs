@@ -20,7 +20,7 @@ use crate::engine::Interrupt;
 use crate::scenario::{NotChecked, Scenario};
 
 /// Run scenarios and check their results
-#[derive(clap::Parser)]
+#[derive(Default, clap::Parser)]
 #[command(
     name = "verify",
     after_help = "Examples:
@@ -92,6 +92,38 @@ pub(crate) fn verify(args: VerifyArgs, shell: &Shell) -> u8 {
         None => verify_all(&args, shell),
     };
     done.unwrap_or_else(|message| shell.refuse(message))
+}
+
+/// The results of scenarios, for a page.
+#[cfg(feature = "mcap")]
+pub(crate) struct ScenarioResults {
+    /// How many checks passed and failed.
+    pub(crate) title: String,
+    /// The rows of the table, with that of the titles.
+    pub(crate) rows: Vec<Vec<String>>,
+    /// What the scenarios are.
+    pub(crate) notes: String,
+    /// The mistakes in the files of scenarios that do not load.
+    pub(crate) reports: Vec<crate::source::Report>,
+    pub(crate) has_passed: bool,
+}
+
+/// Runs scenarios, or all of a folder, for a page.
+///
+/// # Errors
+/// If a file cannot be read.
+#[cfg(feature = "mcap")]
+pub(crate) fn results(paths: Vec<PathBuf>, seeds: Option<u64>, shell: &Shell) -> Result<ScenarioResults, String> {
+    let args = VerifyArgs { paths, seeds, ..VerifyArgs::default() };
+    let mut all = prepare(&args, shell.catalogue())?;
+    let is_complete = run(&mut all, &args, shell)?;
+    Ok(ScenarioResults {
+        title: table::summary(&all),
+        rows: table::rows(&all, false).into_iter().map(Vec::from).collect(),
+        notes: table::notes(&all),
+        has_passed: is_complete && all.iter().all(Verified::has_passed),
+        reports: all.into_iter().filter_map(|verified| verified.loaded.err()).collect(),
+    })
 }
 
 fn verify_all(args: &VerifyArgs, shell: &Shell) -> Result<u8, String> {

@@ -17,6 +17,11 @@ const HEADER: [&str; 10] =
 
 /// Writes the table, a description of each scenario, and the number of checks that passed.
 pub(crate) fn text(all: &[Verified], has_colour: bool) -> String {
+    format!("{}\n{}\n{}\n", table(&rows(all, has_colour), 4, 9), notes(all), summary(all))
+}
+
+/// Returns the rows of the table, with that of the titles.
+pub(crate) fn rows(all: &[Verified], has_colour: bool) -> Vec<[String; 10]> {
     let mut rows = vec![HEADER.map(String::from)];
     for verified in all {
         let first = rows.len();
@@ -29,19 +34,23 @@ pub(crate) fn text(all: &[Verified], has_colour: bool) -> String {
             row[0] = verified.name();
         }
     }
-    let mut text = table(&rows, 4, 9);
-    text.push('\n');
+    rows
+}
+
+/// Describes each scenario, and names the worst runs of figures that failed.
+pub(crate) fn notes(all: &[Verified]) -> String {
+    let mut text = String::new();
     for verified in all {
         if let Ok(scenario) = &verified.loaded {
             text.push_str(&format!("{}: {}\n", verified.name(), describe(scenario)));
             text.extend(verified.rows.iter().filter_map(|row| worst_of(row, &verified.trials)));
         }
     }
-    text.push_str(&format!("\n{}\n", summary(all)));
     text
 }
 
-fn summary(all: &[Verified]) -> String {
+/// Returns how many checks passed and failed.
+pub(crate) fn summary(all: &[Verified]) -> String {
     let marks: Vec<Verdict> = all.iter().flat_map(|verified| &verified.rows).map(FigureRow::verdict).collect();
     let count = |mark: Verdict| marks.iter().filter(|known| **known == mark).count();
     let runs = all.iter().map(|verified| verified.trials.len()).sum();

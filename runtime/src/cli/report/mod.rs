@@ -1,0 +1,67 @@
+//! `report`: recordings and scenarios as one page for a browser, with everything in it.
+
+mod intervals;
+mod page;
+mod run;
+
+use std::path::PathBuf;
+
+use page::HtmlPage;
+
+use super::shell::{FAULTED, NOT_LOADED, Shell};
+use super::verify;
+use crate::recording::{Replay, ReplayChanges, ReplayError};
+
+/// Show recorded runs and the results of scenarios on one page for a browser
+#[derive(clap::Parser)]
+#[command(
+    name = "report",
+    after_help = "The page goes to the standard output. It is one file: it loads nothing, and prints well.
+
+A recording is replayed: the page has what `run` prints, the image and the curves of the ports that the graph
+shows, the graph, its modes and, of a run in real time, when its ticks began. A scenario runs, and its results stand
+beside those of the paper.
+
+Examples:
+  tactflow run graphs/hybrid.toml --record run.mcap
+  tactflow report run.mcap > run.html
+  tactflow report run.mcap graphs/scenarios/table3_ball.toml > page.html
+
+Exit codes: 0 success; 1 a replay differs from its recording, or a check failed; 2 a file does not load."
+)]
+pub(super) struct ReportArgs {
+    /// Recordings (.mcap), scenarios, or folders of scenarios
+    #[arg(required = true)]
+    files: Vec<PathBuf>,
+    /// Run each scenario that has `seeds` with the seeds 1 to N instead of its own
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..=10_000))]
+    seeds: Option<u64>,
+}
+
+pub(super) fn report(args: ReportArgs, shell: &Shell) -> Result<u8, u8> {
+    let names: Vec<String> = args.files.iter().map(|file| file.display().to_string()).collect();
+    let mut page = HtmlPage::new(&names.join(", "));
+    let is_recording = |file: &PathBuf| file.extension().is_some_and(|end| end == "mcap");
+    let (recordings, scenarios): (Vec<PathBuf>, Vec<PathBuf>) = args.files.into_iter().partition(is_recording);
+    let mut code = 0;
+    for path in recordings {
+        let replay = Replay::open(shell.catalogue(), &path, &ReplayChanges::default());
+        let replay = replay.map_err(|error| match error {
+            ReplayError::Message(message) => shell.refuse(message),
+            ReplayError::Graph(report) => shell.reject(&report),
+        })?;
+        let name = path.display().to_string();
+        if let Some(difference) = run::add(&mut page, &name, replay).map_err(|message| shell.refuse(message))? {
+            shell.error(format_args!("{name}: {difference}"));
+            code = FAULTED;
+        }
+    }
+    if !scenarios.is_empty() {
+        let results = verify::results(scenarios, args.seeds, shell).map_err(|message| shell.refuse(message))?;
+        page.table(&results.title, &results.rows, &results.notes);
+        results.reports.iter().for_each(|report| shell.show(report));
+        code = if results.reports.is_empty() { code.max(u8::from(!results.has_passed)) } else { NOT_LOADED };
+    }
+    shell.say(page.finish().trim_end());
+    Ok(code)
+}
