@@ -89,3 +89,47 @@ fn what_a_file_leaves_open_is_asked_for_by_the_options_of_the_command() {
     let whole = say(&["features", path, "--size", "2x2", "--unit", "kPa", "--pitch-mm", "5x5", "--rate-hz", "250"]);
     assert_eq!((whole.code, whole.err.as_str()), (0, ""));
 }
+
+/// The columns of a table of features.
+fn columns(args: &[&str], names: [&str; 4]) -> Vec<[f64; 4]> {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("features.csv");
+    let said = say(&[&["features"], args, &["-o", path.to_str().unwrap()]].concat());
+    assert_eq!((said.code, said.err.as_str()), (0, ""), "{}", said.out);
+    let text = fs::read_to_string(&path).unwrap();
+    let mut rows = text.lines().filter(|line| !line.starts_with('#')).map(|line| line.split(',').collect::<Vec<_>>());
+    let header = rows.next().unwrap();
+    let at = names.map(|name| header.iter().position(|column| *column == name).expect(name));
+    rows.map(|row| at.map(|i| row[i].parse().unwrap_or(f64::NAN))).collect()
+}
+
+#[test]
+fn a_pressure_becomes_a_force_and_the_whole_pad_has_a_centre_of_pressure() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("two.csv");
+    // Two regions of 2 by 2 tactels: 40 kPa at the left, and 120 kPa at the right.
+    let mut row = [0.0; 36];
+    for (corner, value) in [(0, 40.0), (4, 120.0)] {
+        for i in 0..2 {
+            for j in 0..2 {
+                row[(i + 2) * 6 + corner + j] = value;
+            }
+        }
+    }
+    let row = row.map(|value: f64| value.to_string()).join(",");
+    fs::write(&path, format!("{row}\n{row}\n")).unwrap();
+    let path = path.to_str().unwrap();
+    let args = [path, "--size", "6x6", "--unit", "kPa", "--pitch-mm", "5x4", "--rate-hz", "100", "--threshold", "10"];
+    let found = columns(&args, ["touch.moments.force", "whole.force", "whole.x", "touch.moments.x"]);
+    // 1 kPa on 5 by 4 mm is 0.02 N. The centres of the regions are at -10 mm and 10 mm. Of two regions of the same area, the
+    // contact is the first.
+    let [force, whole, centre, contact] = found[1];
+    assert!((force - 4.0 * 40.0 * 0.02).abs() < 1e-6 && (whole - 4.0 * 160.0 * 0.02).abs() < 1e-6, "{force} {whole}");
+    assert!((centre - 0.005).abs() < 1e-9 && (contact + 0.01).abs() < 1e-9, "{centre} {contact}");
+    let said = say(&[&["features"], &args[..]].concat());
+    assert!(
+        said.out.contains("above 10.0000 kPa (from --threshold)\nforces: in N, of the pressure on 0.2000 cm2"),
+        "{}",
+        said.out
+    );
+}

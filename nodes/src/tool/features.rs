@@ -38,7 +38,7 @@ pub(super) struct FeaturesArgs {
     /// Minimum area of a contact [tactels]
     #[arg(long, value_name = "TACTELS", default_value_t = 4, value_parser = clap::value_parser!(u32).range(1..))]
     min_area: u32,
-    /// Minimum sum over a contact [unit of the recording]
+    /// Minimum force of a contact: the sum over its tactels [N; raw, if the recording is]
     #[arg(long, value_name = "VALUE", default_value_t = 0.0, value_parser = finite)]
     min_force: f64,
     /// Number of frames for the averages of pressure and orientation
@@ -75,7 +75,7 @@ pub(super) fn features(args: FeaturesArgs, shell: &Shell) -> u8 {
     let text = match args.read() {
         Some(recording) => {
             let (threshold, origin) = args.threshold(&recording);
-            let text = args.graph_text(threshold, &origin);
+            let text = args.graph_text(threshold, &origin, newtons(&recording));
             if args.graph {
                 shell.say(text.trim_end());
                 return 0;
@@ -84,7 +84,7 @@ pub(super) fn features(args: FeaturesArgs, shell: &Shell) -> u8 {
             text
         }
         // The check of the graph reports what is wrong with the recording, once and at its place.
-        None => args.graph_text(0.0, "from --threshold"),
+        None => args.graph_text(0.0, "from --threshold", None),
     };
     // As `--set`, so that a mistake shows in the arguments.
     let set = args.settings().iter().map(|setting| format!("devices.recording.{setting}")).collect();
@@ -127,9 +127,13 @@ impl FeaturesArgs {
         let shape = &recording.shape;
         let [x, y] = shape.pitch.map(|pitch| (pitch * 1e6).round() * 1e-3);
         let seconds = recording.frames.last().map_or(0.0, |frame| frame.time as f64 * 1e-9);
+        let forces = match newtons(recording) {
+            Some(factor) => format!("\nforces: in N, of the pressure on {:.4} cm2 a tactel", factor * 10.0),
+            None => String::new(),
+        };
         format!(
             "{}: {}, {} by {} tactels of {x} by {y} mm, {} frames in {seconds:.2} s, in {}\n\
-             contact: the largest region of at least {} tactels above {threshold:.4} {} ({origin})",
+             contact: the largest region of at least {} tactels above {threshold:.4} {} ({origin}){forces}",
             self.recording.display(),
             recording.format,
             shape.rows,
@@ -141,9 +145,16 @@ impl FeaturesArgs {
         )
     }
 
-    /// Returns the graph, without the settings of the recording from the command line.
-    fn graph_text(&self, threshold: f64, origin: &str) -> String {
+    /// Returns the graph, without the settings of the recording from the command line. The threshold is in the unit of the
+    /// recording, and `newtons` is the force of one unit of a pressure on a tactel.
+    fn graph_text(&self, threshold: f64, origin: &str, newtons: Option<f64>) -> String {
         let Self { min_area, min_force, window, .. } = self;
+        let (unit, forces) = match newtons {
+            Some(_) => ("N", "set.calibrate.unit = \"N\"            # the pressure times the area of a tactel\n"),
+            None => ("unit of the recording", ""),
+        };
+        let origin = newtons.map_or_else(|| origin.to_owned(), |_| format!("{threshold} kPa, {origin}"));
+        let threshold = threshold * newtons.unwrap_or(1.0);
         let mut text = format!(
             r#"# The features of the contact in a recording.
 [graph]
@@ -156,10 +167,20 @@ pad = "tactile_pad"
 file = "builtin:parts/touch.toml"
 in.image = "pad.image"
 set.calibrate.dead = {{ from = "pad.dead" }}
-set.binarize.threshold = {threshold:?}       # [unit of the recording], {origin}
-set.label = {{ min_area = {min_area}, min_force = {min_force:?} }}   # [tactels, unit of the recording]
+{forces}set.binarize.threshold = {threshold:?}       # [{unit}], {origin}
+set.label = {{ min_area = {min_area}, min_force = {min_force:?} }}   # [tactels, {unit}]
 set.pressure.window = {window}
 set.orientation.window = {window}
+
+[nodes.touched]                     # all tactels above the threshold, in all regions
+type = "binarize"
+in.image = "touch.repaired"
+threshold = {threshold:?}
+
+[nodes.whole]                       # the force and the centre of pressure of the whole pad
+type = "moments"
+in.image = "touch.repaired"
+in.region = "touched.mask"
 
 [bind]
 pad = "recording"
@@ -191,6 +212,12 @@ type = "recording"
         ];
         settings.into_iter().filter_map(|(name, value)| Some(format!("{name} = {}", value?))).collect()
     }
+}
+
+/// Returns the force of one kPa on a tactel of a recording in kPa [N].
+fn newtons(recording: &Recording) -> Option<f64> {
+    let [x, y] = recording.shape.pitch;
+    (recording.shape.unit.to_string() == "kPa").then_some(x * y * 1e3)
 }
 
 /// Parses two lengths greater than 0: a parser for arguments.

@@ -44,20 +44,20 @@ pub(super) fn add(page: &mut HtmlPage, name: &str, mut replay: Replay) -> Result
     if let Some(still) = still {
         page.picture(&still.text(engine), "The strongest image, and what the graph shows over time.");
     }
-    add_graph(page, name, &replay, engine);
     if replay.recording().about().is_real {
         page.picture(&intervals.svg(engine.period()), &intervals.caption(engine.period()));
     }
+    add_graph(page, name, &replay, engine);
     Ok(difference(&replay))
 }
 
 fn add_graph(page: &mut HtmlPage, name: &str, replay: &Replay, engine: &Engine) {
     let outline = replay.outline();
-    let ports = engine.ports().iter().map(|(port, _)| port);
-    page.picture(&graph_svg(outline, ports, name.to_owned()), "The graph: roles, nodes, and what the wires carry.");
     if !outline.modes.is_empty() {
         page.picture(&modes_svg(outline, name.to_owned()), "The modes, and what leads from one to another.");
     }
+    let ports = engine.ports().iter().map(|(port, _)| port);
+    page.picture(&graph_svg(outline, ports, name.to_owned()), "The graph: roles, nodes, and what the wires carry.");
 }
 
 /// Describes a run in one paragraph.
