@@ -6,7 +6,7 @@ use std::io::{BufReader, Read};
 use std::path::{Path, PathBuf};
 
 use mcap::McapError;
-use mcap::records::{Channel, Record, op};
+use mcap::records::{Channel, ChunkHeader, Record, op};
 use mcap::sans_io::linear_reader::{LinearReadEvent, LinearReader, LinearReaderOptions};
 
 use super::about::{Contents, RunAbout};
@@ -23,9 +23,16 @@ pub(super) struct Records {
     path: PathBuf,
     file: BufReader<File>,
     reader: LinearReader,
+    chunk: Chunk,
     /// Whether the file has ended as a whole file does.
     is_complete: bool,
     is_over: bool,
+}
+
+/// Returns the length of the longest record that a file can have [bytes]. A pipe has no length.
+fn longest_record(file: &File) -> usize {
+    let length = file.metadata().ok().filter(std::fs::Metadata::is_file).map(|file| file.len());
+    length.and_then(|length| usize::try_from(length).ok()).map_or(MAX_RECORD, |length| length.min(MAX_RECORD))
 }
 
 impl Records {
@@ -37,10 +44,10 @@ impl Records {
         let file = File::open(path).map_err(|error| format!("cannot open `{}`: {error}", path.display()))?;
         let options = LinearReaderOptions::default()
             .with_skip_end_magic(true)
-            .with_validate_chunk_crcs(true)
-            .with_record_length_limit(MAX_RECORD);
+            .with_emit_chunks(true)
+            .with_record_length_limit(longest_record(&file));
         let (file, reader) = (BufReader::with_capacity(BUFFER_BYTES, file), LinearReader::new_with_options(options));
-        Ok(Self { path: path.to_owned(), file, reader, is_complete: false, is_over: false })
+        Ok(Self { path: path.to_owned(), file, reader, chunk: Chunk::default(), is_complete: false, is_over: false })
     }
 
     /// Passes the next record of the data to `take`, and returns what it makes of it. `None` at the end of the data or at
@@ -50,9 +57,17 @@ impl Records {
     /// If the file is no MCAP file, or is damaged.
     pub(super) fn next<T>(&mut self, take: impl FnOnce(Record<'_>) -> T) -> Result<Option<T>, String> {
         while !self.is_over {
+            if let Some(record) = self.chunk.next_record() {
+                return match record.and_then(|(opcode, data)| parsed(opcode, data)) {
+                    Ok(record) => Ok(Some(take(record))),
+                    Err(why) => Err(damaged(&self.path, &why)),
+                };
+            }
             let event = match self.reader.next_event() {
-                None | Some(Err(McapError::UnexpectedEof)) => break,
-                Some(Err(error)) => return Err(self.damaged(&error)),
+                // A record that is longer than the file was cut with it.
+                None | Some(Err(McapError::UnexpectedEof | McapError::RecordTooLarge { .. })) => break,
+                Some(Err(McapError::BadMagic)) => return Err(format!("`{}` is no MCAP file", self.path.display())),
+                Some(Err(error)) => return Err(damaged(&self.path, &error)),
                 Some(Ok(event)) => event,
             };
             match event {
@@ -65,9 +80,12 @@ impl Records {
                     self.is_complete = true;
                     break;
                 }
-                LinearReadEvent::Record { opcode, data } => match mcap::parse_record(opcode, data) {
+                LinearReadEvent::Record { opcode, data } => match parsed(opcode, data) {
+                    Ok(Record::Chunk { header, data }) => {
+                        self.chunk.refill(&header, &data).map_err(|why| damaged(&self.path, &why))?;
+                    }
                     Ok(record) => return Ok(Some(take(record))),
-                    Err(error) => return Err(self.damaged(&error)),
+                    Err(why) => return Err(damaged(&self.path, &why)),
                 },
             }
         }
@@ -75,18 +93,54 @@ impl Records {
         Ok(None)
     }
 
-    fn damaged(&self, error: &McapError) -> String {
-        let path = self.path.display();
-        match error {
-            McapError::BadMagic => format!("`{path}` is no MCAP file"),
-            error => format!("`{path}` is damaged: {error}"),
-        }
-    }
-
     /// Whether the end of the data was found.
     pub(super) const fn is_complete(&self) -> bool {
         self.is_complete
     }
+}
+
+/// The records of a chunk. The reader of the library trusts the lengths of its records.
+#[derive(Default)]
+struct Chunk {
+    data: Vec<u8>,
+    /// Where the next record begins.
+    at: usize,
+}
+
+impl Chunk {
+    /// Takes the next chunk, which must not be compressed.
+    fn refill(&mut self, header: &ChunkHeader, data: &[u8]) -> Result<(), String> {
+        if !header.compression.is_empty() {
+            return Err(format!("its compression `{}` is unknown", header.compression));
+        }
+        if header.uncompressed_crc != 0 && crc32fast::hash(data) != header.uncompressed_crc {
+            return Err("the checksum of a chunk is wrong".to_owned());
+        }
+        self.data.clear();
+        self.data.extend_from_slice(data);
+        self.at = 0;
+        Ok(())
+    }
+
+    /// Returns the next record with its sort, or `None` after the last one.
+    fn next_record(&mut self) -> Option<Result<(u8, &[u8]), String>> {
+        let (opcode, rest) = self.data.get(self.at..)?.split_first()?;
+        let Some((length, rest)) = rest.split_first_chunk() else { return Some(Err(OUTSIDE.to_owned())) };
+        let length = usize::try_from(u64::from_le_bytes(*length)).ok().filter(|length| *length <= rest.len());
+        let Some(length) = length else { return Some(Err(OUTSIDE.to_owned())) };
+        self.at += 1 + size_of::<u64>() + length;
+        Some(Ok((*opcode, &rest[..length])))
+    }
+}
+
+const OUTSIDE: &str = "a record ends outside of its chunk";
+
+fn parsed(opcode: u8, data: &[u8]) -> Result<Record<'_>, String> {
+    mcap::parse_record(opcode, data).map_err(|error| error.to_string())
+}
+
+fn damaged(path: &Path, why: &dyn std::fmt::Display) -> String {
+    format!("`{}` is damaged: {why}", path.display())
 }
 
 /// A channel of a recording.

@@ -10,6 +10,7 @@ mod campaign;
 mod files;
 mod mutate;
 mod recordings;
+mod runs;
 mod wires;
 
 pub use campaign::{Campaign, Failure, Measure, Tally};
@@ -64,6 +65,7 @@ pub const TARGETS: &[Target] = &[
     Target { name: "urdf", title: "models of robots", open: files::models },
     Target { name: "calibration", title: "calibrations of pads", open: files::calibrations },
     Target { name: "set", title: "assignments of the command line", open: files::assignments },
+    Target { name: "mcap", title: "recordings of whole runs", open: runs::recordings },
     Target { name: "words", title: "words of an operator", open: files::words },
 ];
 
