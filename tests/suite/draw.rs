@@ -95,7 +95,7 @@ fn the_modes_are_drawn_with_the_conditions_of_their_exits() {
     // Four modes, start, done and fault; the start, and the exits of the file.
     assert_eq!((boxes, arrows), (7, 1 + 10));
     for text in
-        ["error.error.pressure within 0.003", "touch.present is lost for 100 ms", "after a way of 60 mm", "fault"]
+        ["error.error.pressure within 0.003", "touch.present is lost for 100 ms", "after 60 mm of travel", "fault"]
     {
         assert!(texts.iter().any(|line| line == text), "{text}: {texts:?}");
     }
@@ -114,4 +114,5 @@ fn mermaid_and_dot_have_the_same_arrows_as_the_picture() {
     assert_eq!([count(&dot, " -> "), count(&dot, "subgraph cluster")], [arrows, frames]);
     assert_eq!(count(&dot, "[label="), boxes + arrows);
     assert_eq!(dot.matches('{').count(), dot.matches('}').count());
+    assert!(mermaid.starts_with("---\ntitle: \"graphs/carry.toml\"\n---\n"), "a path may have a colon: {mermaid}");
 }

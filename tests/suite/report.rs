@@ -37,18 +37,6 @@ fn a_run_has_its_summary_its_curves_its_graph_and_its_modes() {
 }
 
 #[test]
-fn a_run_in_real_time_has_the_times_between_its_ticks() {
-    let (_folder, run) = in_new_folder("run.mcap");
-    let said = say(&["run", "graphs/force.toml", "--realtime", "--for", "1s", "--quiet", "--record", &run]);
-    assert_eq!(said.code, 0, "{}", said.err);
-    let (code, read, _) = page_of(&[&run]);
-    assert_eq!(code, 0);
-    assert!(read.starts_with("1 4 0\n"), "{read}");
-    let caption = read.lines().find(|line| line.starts_with("The times between two ticks, of 4.000 ms")).unwrap();
-    assert!(caption.contains("99 % below") && caption.contains("the longest is"), "{caption}");
-}
-
-#[test]
 fn a_scenario_stands_beside_the_paper_and_its_failure_is_the_exit_code() {
     let (code, read, page) = page_of(&["tests/scenarios/slide.toml", "tests/scenarios/missed.toml"]);
     assert_eq!(code, 1);

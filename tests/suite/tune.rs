@@ -48,6 +48,17 @@ fn a_slow_edge_gets_the_gain_that_was_found_by_hand_and_the_files_keep_their_com
 }
 
 #[test]
+fn a_picture_that_cannot_be_written_is_found_before_the_robot_moves() {
+    let (_folder, page) = in_new_folder("page.html");
+    fs::write(&page, "<html><svg></svg></html>").unwrap();
+    for path in [page.as_str(), "/nowhere/bode.svg"] {
+        let said = say(&["tune", "graphs/edge.toml", "--feature", "orientation", "--svg", path]);
+        assert_eq!(said.code, 2, "{}{}", said.out, said.err);
+        assert!(said.err.contains(path) && !said.err.contains("test signal"), "{}", said.err);
+    }
+}
+
+#[test]
 fn what_cannot_be_tuned_says_why() {
     for (args, why) in [
         (

@@ -437,6 +437,25 @@ fn a_scenario_runs_on_each_of_its_benches_and_names_them() {
     let said = say(&["verify", path]);
     assert_eq!((said.code, said.err.matches("error[").count()), (2, 1), "{}", said.err);
     assert!(said.err.contains("pin.toml") && said.err.contains("both.toml:3:"), "{}", said.err);
+    // Two benches of one name would have one name in the table, and a live one is marked where it stands.
+    for (names, why) in [
+        (["ball", "ball"], "expected benches whose files have different names"),
+        (["ball", "myrmex_lwr"], "runs in real time"),
+    ] {
+        fs::write(path, on(&names)).unwrap();
+        let said = say(&["verify", path]);
+        assert_eq!(said.code, 2, "{}", said.err);
+        assert!(said.err.contains(why), "{}", said.err);
+        let mark = said.err.lines().find(|line| line.contains('^')).unwrap().find('^').unwrap();
+        let line = said.err.lines().find(|line| line.contains("bench = [")).unwrap();
+        assert!(
+            line[mark..].starts_with('\'')
+                && line[mark + 1..].split('\'').next().unwrap().ends_with(&format!("{}.toml", names[1])),
+            "{}",
+            said.err
+        );
+        assert_eq!(line[mark..].matches(".toml").count(), 1, "the second one is marked: {}", said.err);
+    }
     fs::write(path, on(&[])).unwrap();
     let said = say(&["verify", path]);
     assert!(said.err.contains("expected the path of a bench, or a list of such paths"), "{}", said.err);

@@ -15,7 +15,7 @@ use tactflow_runtime::signal::{Scalar, Twist};
 /// velocity of the contact, and not that of the origin.
 ///
 /// Wire it behind the `projector`, before the motions of guides are added. Without a contact, while `in.x` or `in.y` is
-/// absent, the twist passes unchanged.
+/// absent, the twist is absent too.
 ///
 /// ```toml
 /// [nodes.pivot]                       # roll about the contact
@@ -34,11 +34,11 @@ pub struct Inputs<'a> {
     #[port(frame = "A")]
     twist: In<'a, Twist>,
     /// Place of the contact along the sensor's x.
-    #[port(unit = "m", frame = "A", quantity = "x", optional, sampled)]
-    x: Option<In<'a, Scalar>>,
+    #[port(unit = "m", frame = "A", quantity = "x", sampled)]
+    x: In<'a, Scalar>,
     /// Place of the contact along the sensor's y.
-    #[port(unit = "m", frame = "A", quantity = "y", optional, sampled)]
-    y: Option<In<'a, Scalar>>,
+    #[port(unit = "m", frame = "A", quantity = "y", sampled)]
+    y: In<'a, Scalar>,
 }
 
 /// What `pivot` writes.
@@ -60,7 +60,7 @@ impl Node for Pivot {
     }
 
     fn step(&self, _: &Tick, inputs: Inputs<'_>, out: &mut Outputs, (): &mut ()) {
-        let contact = inputs.x.zip(inputs.y).map_or_else(Vector3::zeros, |(x, y)| Vector3::new(*x, *y, 0.0));
+        let contact = Vector3::new(*inputs.x, *inputs.y, 0.0);
         let [linear, angular] = [inputs.twist.linear(), inputs.twist.angular()];
         out.twist.set(Twist::new(linear - angular.cross(&contact), angular));
     }
@@ -84,7 +84,7 @@ mod tests {
             let mut rig = NodeRig::new::<Pivot>("", &wires).unwrap();
             rig.set("twist", Twist::new(wanted, rotation.into()));
             rig.step();
-            assert_eq!(rig.get::<Twist>("twist").unwrap().linear(), wanted, "without a contact it passes unchanged");
+            assert_eq!(rig.get::<Twist>("twist"), None, "there is no contact");
             rig.set("twist", Twist::new(wanted, rotation.into()));
             rig.set("x", contact[0]);
             rig.set("y", contact[1]);

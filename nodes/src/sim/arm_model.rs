@@ -1,5 +1,6 @@
 //! The model of a simulated arm: its kinematics, and the springs and dampers of its joints.
 
+use parry3d_f64::math::Vec3;
 use tactflow_runtime::node::{At, FilePath, Mistake, Mistakes, Param};
 use tactflow_runtime::signal::JointsShape;
 use tactflow_runtime::source::Code;
@@ -51,10 +52,11 @@ pub struct ArmBody {
     #[param(unit = "N m", range = 0.0.., default = 0.1)]
     pub friction: f64,
     /// Mass at the sensor that couples the joints, such as a heavy tool.
-    #[param(unit = "kg", range = 0.0.., default = 0.0)]
+    #[param(unit = "kg", range = 0.0.., usual = ..=20.0, default = 0.0)]
     pub load: f64,
-    /// Mass at the sensor whose weight the controller does not compensate; negative if it compensates too much.
-    #[param(unit = "kg", default = 0.0)]
+    /// Mass at the sensor whose weight the controller does not compensate; negative if it compensates too much. The weight
+    /// acts along -z of the base, and of the cell in `sim_pair`.
+    #[param(unit = "kg", usual = -5.0..=5.0, default = 0.0)]
     pub gravity_error: f64,
     /// Largest acceleration that an arm states for each joint.
     #[param(unit = "rad/s2", above = 0.0, default = 10.0)]
@@ -92,9 +94,9 @@ impl ArmModel {
         Ok(facts)
     }
 
-    /// Returns the arm at rest in its first posture.
+    /// Returns the arm at rest in its first posture, with the direction of weights in its base.
     #[must_use]
-    pub fn arm(&self, loaded: LoadedArm) -> SimArm {
+    pub fn arm(&self, loaded: LoadedArm, down: Vec3) -> SimArm {
         let joint = |inertia: f64| JointDynamics {
             stiffness: self.body.stiffness,
             damping_ratio: self.body.damping_ratio,
@@ -102,7 +104,7 @@ impl ArmModel {
             friction: self.body.friction,
         };
         let arm = SimArm::new(loaded.chain, self.inertia().iter().copied().map(joint).collect(), loaded.start);
-        arm.with_load(ArmLoad { mass: self.body.load, uncompensated: self.body.gravity_error })
+        arm.with_load(ArmLoad { mass: self.body.load, uncompensated: self.body.gravity_error, down })
     }
 
     fn inertia(&self) -> &[f64] {

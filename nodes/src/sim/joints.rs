@@ -20,6 +20,7 @@ use super::contact::BodyMotion;
 use super::shape::pose3;
 use super::wrench::Wrench;
 use crate::arm::chain::Chain;
+use crate::motion::weight::GRAVITY;
 
 /// Dynamic properties of a joint.
 #[derive(Debug, Clone, Copy)]
@@ -52,16 +53,21 @@ pub struct SimArm {
 }
 
 /// What an arm carries beside its links, at the origin of the sensor.
-#[derive(Debug, Clone, Copy, Default)]
+#[derive(Debug, Clone, Copy)]
 pub struct ArmLoad {
     /// Mass that couples the joints [kg].
     pub mass: f64,
     /// Mass whose weight the controller does not compensate [kg].
     pub uncompensated: f64,
+    /// Direction of the weight, in the base.
+    pub down: Vec3,
 }
 
-/// Acceleration by gravity [m/s²].
-const GRAVITY: f64 = 9.81;
+impl Default for ArmLoad {
+    fn default() -> Self {
+        Self { mass: 0.0, uncompensated: 0.0, down: -Vec3::Z }
+    }
+}
 
 /// Strain at which friction slips [rad].
 pub(super) const MAX_STRAIN: f64 = 2e-4;
@@ -102,7 +108,7 @@ impl SimArm {
 
     /// Returns the weight that the controller does not compensate.
     fn weight(&self) -> Wrench {
-        Wrench { force: Vec3::new(0.0, 0.0, -GRAVITY * self.load.uncompensated), moment: Vec3::ZERO }
+        Wrench { force: self.load.down * (GRAVITY * self.load.uncompensated), moment: Vec3::ZERO }
     }
 
     /// Returns a wrench about the origin of the sensor as one about the origin of the base.

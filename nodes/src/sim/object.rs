@@ -59,7 +59,8 @@ pub struct ObjectParams {
     /// Mass, used with a `mount`; the damping of the mount is half of the critical one.
     #[param(unit = "kg", above = 0.0, default = 1.0)]
     pub(crate) mass: f64,
-    /// Stiffness of its mount against a rotation about its centre; it does not turn under a load if not given.
+    /// Stiffness of its mount against a rotation about its centre, which must stay below 0.3 rad; it does not turn under a
+    /// load if not given.
     #[param(unit = "N m/rad", above = 0.0)]
     pub(crate) turn_mount: Option<f64>,
     /// Moment of inertia about every axis, used with a `turn_mount`; its damping is half of the critical one.

@@ -146,7 +146,7 @@ fn energy_does_not_grow() {
         (slide(undamped), lossless(), soft.clone(), true),
         (slide(undamped), Foam::default(), soft, false),
         (lwr(0.0, 0.0), lossless(), tilted.clone(), true),
-        (lwr(0.0, 0.0).with_load(ArmLoad { mass: 1.5, uncompensated: 0.0 }), lossless(), tilted.clone(), true),
+        (lwr(0.0, 0.0).with_load(ArmLoad { mass: 1.5, ..ArmLoad::default() }), lossless(), tilted.clone(), true),
         (lwr(0.2, 0.1), Foam::default(), tilted, false),
     ];
     for (case, (arm, foam, thing, is_lossless)) in cases.into_iter().enumerate() {
@@ -175,13 +175,13 @@ fn a_load_slows_an_arm_and_hangs_from_its_springs() {
     let joint = JointDynamics { stiffness: 5000.0, damping_ratio: 0.0, inertia: 2.0, friction: 0.0 };
     let far = thing(ShapeKind::Plane, [0.0, 0.0, 0.5]);
     // The weight of 0.4 kg lets the spring sag by m g / k, and the arm begins at rest there.
-    let hangs = slide(joint).with_load(ArmLoad { mass: 0.0, uncompensated: 0.4 });
+    let hangs = slide(joint).with_load(ArmLoad { uncompensated: 0.4, ..ArmLoad::default() });
     let mut hanging = world(hangs, lossless(), std::slice::from_ref(&far), 0.0005);
     hanging.advance(1.0, &[0.0]);
     let (q, sag) = (hanging.arm.position[0], hanging.arm.equilibrium[0]);
-    assert!(q.abs() < 1e-12 && (sag - 0.4 * 9.81 / 5000.0).abs() < 1e-12, "{q} {sag}");
+    assert!(q.abs() < 1e-12 && (sag - 0.4 * crate::motion::weight::GRAVITY / 5000.0).abs() < 1e-12, "{q} {sag}");
     // A mass swings with the joint: half a period of √(k / (I + m)) after the spring was loaded, it is on the other side.
-    let swings = slide(joint).with_load(ArmLoad { mass: 1.5, uncompensated: 0.0 });
+    let swings = slide(joint).with_load(ArmLoad { mass: 1.5, ..ArmLoad::default() });
     let mut swinging = world(swings, lossless(), &[far], 0.0001);
     swinging.arm.equilibrium[0] += 0.01;
     let half = std::f64::consts::PI / (5000.0_f64 / 3.5).sqrt();
@@ -192,7 +192,7 @@ fn a_load_slows_an_arm_and_hangs_from_its_springs() {
 /// The acceleration of seven joints with a mass at the sensor, against the whole inertia matrix.
 #[test]
 fn a_load_couples_the_joints_as_the_inertia_matrix_says() {
-    let mut coupled = lwr(0.0, 0.0).with_load(ArmLoad { mass: 1.5, uncompensated: 0.0 });
+    let mut coupled = lwr(0.0, 0.0).with_load(ArmLoad { mass: 1.5, ..ArmLoad::default() });
     let (step, inertia) = (1e-6, [2.0, 2.0, 1.0, 0.8, 0.3, 0.25, 0.1]);
     let pull: Vec<f64> = (0..7).map(|i| 0.01 * f64::from(i - 3)).collect();
     coupled.equilibrium.iter_mut().zip(&pull).for_each(|(equilibrium, by)| *equilibrium += by);
@@ -222,7 +222,7 @@ fn a_load_couples_the_joints_as_the_inertia_matrix_says() {
 
 #[test]
 fn an_object_on_a_turning_mount_tilts_by_the_moment_over_its_stiffness() {
-    // A box that the pad meets 30 mm beside its centre, where the pad ends and the box goes on.
+    // A box that ends under the pad: the pad meets it about 65 mm beside its centre.
     let turning = ObjectParams {
         size: Some([0.2, 0.2, 0.02]),
         turn_mount: Some(40.0),
@@ -238,6 +238,27 @@ fn an_object_on_a_turning_mount_tilts_by_the_moment_over_its_stiffness() {
     let wanted = force * (0.07 - middle.x) / 40.0;
     assert!(force > 3.0 && (tilt.y / wanted - 1.0).abs() < 0.03, "{tilt} under {force} N at {}", middle.x);
     assert!(tilt.x.abs() < 0.02 * tilt.y.abs(), "{tilt}");
+    // The box itself has turned: a mark at its end moves by the tilt times the lever, against the push.
+    let mark = world.objects[0].pose.transform_point(Vec3::new(-0.1, 0.0, 0.0));
+    let moved = mark - Vec3::new(-0.03, 0.0, 0.012);
+    assert!((moved.z / (0.1 * tilt.y) - 1.0).abs() < 0.02 && moved.z > 5e-4, "{moved} with {tilt}");
+}
+
+#[test]
+fn the_velocity_of_an_object_that_turns_is_the_derivative_of_its_place() {
+    let turning = ObjectParams { turn_mount: Some(4.0), ..ball(0.04, [0.0, 0.0, 0.05]) };
+    let mut object = object(&turning);
+    let (dt, load) = (1e-4, Wrench { force: Vec3::ZERO, moment: Vec3::new(0.3, -0.2, 0.1) });
+    let mark = Vec3::new(0.03, 0.01, -0.02);
+    let mut last = object.pose.transform_point(mark);
+    for step in 1..=2000 {
+        object.step(f64::from(step) * dt, dt, &load);
+        let now = object.pose.transform_point(mark);
+        let velocity = object.velocity_at(now);
+        assert!(velocity.distance((now - last) / dt) < 0.06 * velocity.length() + 1e-5, "{velocity} in step {step}");
+        last = now;
+    }
+    assert!(object.tilt.length() > 0.05, "it turns: {}", object.tilt);
 }
 
 #[test]

@@ -46,7 +46,14 @@ impl Param for Benches {
     fn read(value: &Value, reader: &mut Reader<'_>) -> Option<Self> {
         match &value.item {
             Item::Array(items) if !items.is_empty() => {
-                items.iter().map(|item| FilePath::read(item, reader)).collect::<Option<_>>().map(Self)
+                let files: Vec<FilePath> =
+                    items.iter().map(|item| FilePath::read(item, reader)).collect::<Option<_>>()?;
+                let name = |file: &FilePath| file.path.file_stem().map(std::ffi::OsStr::to_owned);
+                let twice = (1..files.len()).find(|i| files[..*i].iter().any(|file| name(file) == name(&files[*i])));
+                match twice {
+                    Some(i) => reader.wrong_type(&items[i], "benches whose files have different names"),
+                    None => Some(Self(files)),
+                }
             }
             Item::String(_) => FilePath::read(value, reader).map(|file| Self(vec![file])),
             _ => reader.wrong_type(value, Self::EXPECTS),

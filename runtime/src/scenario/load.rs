@@ -59,7 +59,7 @@ impl Scenario {
                 let vary = document.scenario.as_ref().and_then(|table| table.vary.as_ref());
                 found.extend(vary.into_iter().flat_map(|vary| vary.mistakes(catalogue, &request, plan.outline())));
                 let name = file.filter(|_| benches.len() > 1).map(|file| name_of(&file));
-                let scenario = look_up(&document, request, &mut plan, catalogue, found)?;
+                let scenario = look_up(&document, (request, bench), &mut plan, catalogue, found)?;
                 Ok((Self { bench: name, ..scenario }, benches.len()))
             }
             Err(report) => {

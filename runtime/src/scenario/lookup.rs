@@ -21,7 +21,7 @@ use crate::source::{Code, Diagnostic, Item, Report, Value, quoted, suggest_name,
 /// Resolves every name of the scenario, or returns a diagnostic for each that does not exist.
 pub(super) fn look_up(
     document: &Document,
-    request: Request,
+    (request, bench): (Request, usize),
     plan: &mut Compiled,
     catalogue: &Catalogue,
     found: Vec<Diagnostic>,
@@ -43,7 +43,7 @@ pub(super) fn look_up(
         let from = table.from.as_ref().and_then(|word| Some((word.value.clone(), lookup.flag(word)?)));
         let never_lost = table.never_lost.as_ref().and_then(|word| lookup.flag(word));
         lookup.modes(table);
-        lookup.real_time(table);
+        lookup.real_time(table, bench);
         rows.extend(rows_of(table));
         Scenario {
             for_s: table.for_s,
@@ -296,9 +296,9 @@ impl Lookup<'_> {
     }
 
     /// Rejects a bench with live devices.
-    fn real_time(&mut self, table: &ScenarioTable) {
+    fn real_time(&mut self, table: &ScenarioTable, bench: usize) {
         if self.plan.is_live() {
-            let at = table.bench.as_ref().and_then(|benches| benches.0.first()).unwrap_or(&table.graph);
+            let at = table.bench.as_ref().and_then(|benches| benches.0.get(bench)).unwrap_or(&table.graph);
             let message = "a device of this bench runs in real time, but scenarios run in virtual time";
             let help = "use a bench of simulated devices; to record a run in real time, use `tactflow run --out`";
             self.found.push(Diagnostic::new(Code::WrongRole, at.span.clone(), message).help(help));

@@ -9,6 +9,7 @@ mod check;
 use std::borrow::Cow;
 
 use nalgebra::IsometryMatrix3;
+use parry3d_f64::math::Vec3;
 use tactflow_runtime::device::{
     Commands, Description, Device, DeviceError, Disturbance, Driver, Opened, Output, Samples, Stepped,
 };
@@ -85,7 +86,7 @@ pub struct Params {
 /// The controller compensates gravity, up to a `gravity_error`, and a `load` at the sensor couples the joints. An object
 /// with a `turn_mount` turns under a load. `gain_error` lets the tactels differ from their calibration.
 ///
-/// Not simulated: coupling of the joints by the masses of the links, interaction between columns of foam, friction on
+/// Not simulated: coupling of the joints by the masses of the links, Coriolis forces, interaction between columns of foam, friction on
 /// the housing, wear and temperature.
 ///
 /// ```toml
@@ -175,7 +176,7 @@ impl Device for SimBench {
             beats: Beats::new(period, params.for_s.map_or(i64::MAX, nanos)),
             sequence: 0,
             threshold: pad.threshold,
-            world: world(&params, model.arm(arm), shape)?,
+            world: world(&params, model.arm(arm, -Vec3::Z), shape)?,
         };
         Ok(Opened { description, driver: Driver::Stepped(Box::new(bench)) })
     }

@@ -13,6 +13,7 @@ pub mod world;
 #[cfg(test)]
 mod tests;
 
+use parry3d_f64::math::Vec3;
 use tactflow_runtime::device::{Commands, Description, Device, DeviceError, Driver, Opened, Samples, Stepped};
 use tactflow_runtime::node::{Describe, FilePath, Mistakes, Param, refuse_any};
 use tactflow_runtime::signal::{Joint, Pose};
@@ -96,8 +97,7 @@ pub struct Params {
 /// each has its own noise. The role `true_object`, which a bench binds as `object`, gives the true position of the
 /// object, the forces on it and whether it is held to scenarios and recordings only.
 ///
-/// Not simulated: contact of an arm or a pad with the other one or with the table; gravity on the arms, which their
-/// controllers compensate; air; further objects; and what `sim_bench` does not simulate.
+/// Not simulated: contact of an arm or a pad with the other one or with the table; air; further objects; and what `sim_bench` does not simulate.
 ///
 /// ```toml
 /// [roles]
@@ -203,7 +203,9 @@ impl Params {
         let tactels = pad.tactels();
         let readout = Readout::new(tactels, pad.electronics.clone(), self.seed).with_noise(noise);
         let joints = loaded.joints.joints.clone();
-        Ok((Side { arm, joints, frames: Frames::new(image, readout, tactels, times) }, model.arm(loaded)))
+        let side = if name == NAMES[0] { &self.left } else { &self.right };
+        let down = pose3(&Pose(side.base.pose())).rotation.inverse() * -Vec3::Z;
+        Ok((Side { arm, joints, frames: Frames::new(image, readout, tactels, times) }, model.arm(loaded, down)))
     }
 }
 

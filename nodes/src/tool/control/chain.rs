@@ -15,7 +15,7 @@ pub(crate) struct Limiter {
 }
 
 /// Types that make the twist of a task, where the way back ends.
-const MAKERS: [&str; 4] = ["twist_adder", "projector", "inverse_jacobian", "twist_source"];
+const MAKERS: [&str; 5] = ["twist_adder", "projector", "pivot", "inverse_jacobian", "twist_source"];
 
 /// Returns the limiters before a port, the first one first, and the port of the twist before all of them.
 pub(crate) fn chain(nodes: &Nodes<'_>, port: &str) -> Result<(Vec<Limiter>, String), String> {

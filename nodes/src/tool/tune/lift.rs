@@ -16,7 +16,7 @@ const SPEED: f64 = 0.015;
 /// Exits that fail, and those of a lost contact, stay.
 pub(super) fn settings(outline: &Outline, mode: &OutlinedMode, adder: &str, after_s: f64) -> Vec<String> {
     let after_ms = (after_s * 1e3).ceil();
-    let mut exits = vec![format!("{{ to = \"{MODE}\", after_ms = {after_ms:?} }}")];
+    let mut exits = vec![format!("{{ to = \"{MODE}\", after_ms = {after_ms:?}, priority = 1 }}")];
     // The modes behind the exits stay reachable, by words that nobody sends.
     exits.extend(targets(mode).iter().map(|to| format!("{{ to = {to:?}, on = \"{MODE}_{to}\" }}")));
     let projectors = outline.nodes.iter().filter(|node| node.kind.text == "projector");
@@ -38,4 +38,32 @@ fn targets(mode: &OutlinedMode) -> BTreeSet<String> {
     let exits = exits.filter_map(|setting| serde_json::to_value(&setting.value).ok());
     let exits = exits.flat_map(|exits| if let Value::Array(exits) = exits { exits } else { vec![exits] });
     exits.filter_map(|exit| exit["to"].as_str().map(str::to_owned)).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use tactflow_runtime::graph::{Request, compile};
+
+    use super::*;
+
+    #[test]
+    fn every_mode_of_the_shipped_tasks_can_end_by_a_lift() {
+        let graphs = concat!(env!("CARGO_MANIFEST_DIR"), "/../graphs");
+        let catalogue = crate::catalogue();
+        let mut with_exits = 0;
+        for task in ["square", "explore", "hybrid", "edge", "seek_ridge"] {
+            let request = Request::file(format!("{graphs}/{task}.toml"));
+            let load = |request: &Request| {
+                compile(&catalogue, request).unwrap_or_else(|report| panic!("{task}: {}", report.render(false)))
+            };
+            let compiled = load(&request);
+            for mode in &compiled.outline().modes {
+                let lift = settings(compiled.outline(), mode, "sum", 10.0);
+                let lifted = load(&Request { set: lift, ..request.clone() });
+                assert!(lifted.outline().modes.iter().any(|mode| mode.name == MODE), "{task}");
+                with_exits += targets(mode).len();
+            }
+        }
+        assert!(with_exits >= 5, "{with_exits} exits");
+    }
 }

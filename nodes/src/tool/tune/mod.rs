@@ -9,7 +9,7 @@ mod save;
 mod trial;
 
 use std::collections::BTreeMap;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use serde::Serialize;
 use tactflow_runtime::cli::clap::{self, ValueEnum};
@@ -149,8 +149,7 @@ impl From<String> for Stop {
 }
 
 pub(super) fn run(args: TuneArgs, shell: &Shell) -> Result<u8, u8> {
-    let replaces = |path: &PathBuf| may_replace(path, "an SVG picture", |text| text.contains("<svg"));
-    args.svg.as_ref().map_or(Ok(()), replaces).map_err(|message| shell.refuse(message))?;
+    args.svg.as_deref().map_or(Ok(()), writable).map_err(|message| shell.refuse(message))?;
     let request = args.graph_args.request(args.graph.clone());
     // Each run opens the devices by itself, and most devices can be open once.
     let compiled = compile(shell.catalogue(), &request).map_err(|report| shell.reject(&report))?;
@@ -165,10 +164,6 @@ pub(super) fn run(args: TuneArgs, shell: &Shell) -> Result<u8, u8> {
         Format::Json => shell.say_json(&tuned),
         Format::Text => shell.say(page::text(&tuned).trim_end()),
     }
-    if let Some(path) = &args.svg {
-        write(path, &bode::svg(&tuned)).map_err(|message| shell.refuse(message))?;
-        shell.say_beside(&format!("wrote {}", path.display()));
-    }
     let is_whole =
         tuned.features.iter().all(|feature| feature.new.is_some()) && tuned.settled.iter().all(Settled::is_good);
     if args.save && is_whole {
@@ -177,7 +172,18 @@ pub(super) fn run(args: TuneArgs, shell: &Shell) -> Result<u8, u8> {
     } else if args.save {
         shell.warning("nothing is written: not all features have gains that hold");
     }
+    if let Some(path) = &args.svg {
+        write(path, &bode::svg(&tuned)).map_err(|message| shell.refuse(message))?;
+        shell.say_beside(&format!("wrote {}", path.display()));
+    }
     Ok(u8::from(!is_whole))
+}
+
+/// Checks before the long measurement that a picture can be written.
+fn writable(path: &Path) -> Result<(), String> {
+    may_replace(path, "an SVG picture", |text| text.trim().is_empty() || text.trim_start().starts_with("<svg"))?;
+    let opened = std::fs::OpenOptions::new().append(true).create(true).open(path);
+    opened.map(drop).map_err(|error| format!("cannot write `{}`: {error}", path.display()))
 }
 
 fn tune(args: &TuneArgs, shell: &Shell, request: &Request, outline: &Outline) -> Result<Tuned, Stop> {

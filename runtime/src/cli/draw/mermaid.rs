@@ -4,7 +4,8 @@ use super::picture::{Look, Picture};
 
 /// Returns the picture as a flowchart.
 pub(super) fn text(picture: &Picture) -> String {
-    let mut text = format!("---\ntitle: {}\n---\nflowchart TB\n", picture.title);
+    // A string of JSON is one of YAML.
+    let mut text = format!("---\ntitle: {}\n---\nflowchart TB\n", serde_json::Value::from(picture.title.as_str()));
     boxes(picture, None, "    ", &mut text);
     for arrow in &picture.arrows {
         let line = if arrow.is_dashed { "-.->" } else { "-->" };

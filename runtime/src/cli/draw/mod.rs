@@ -1,4 +1,4 @@
-//! `draw`: a graph as a picture, with its parts as boxes, or its modes.
+//! `draw`: a graph as a picture, with a frame around each part, or its modes.
 
 mod dot;
 mod layout;
@@ -16,11 +16,12 @@ use super::shell::Shell;
 use super::shell::command::GraphArgs;
 use crate::graph::{Outline, PlannedPort, compile};
 
-/// Draw a graph: its roles, nodes and wires, with parts as boxes, or its modes
+/// Draw a graph: its roles, nodes and wires, with a frame around each part, or its modes
 #[derive(clap::Parser)]
 #[command(
     name = "draw",
-    after_help = "The picture goes to the standard output. Each wire has its port, its kind, its unit and its frames.
+    after_help = "The picture goes to the standard output. Each wire has its port, its kind, its unit and its frames. Dashed
+arrows between modes are `fail` and `on_lost`.
 
 Examples:
   tactflow draw graphs/hybrid.toml > hybrid.svg
@@ -36,7 +37,7 @@ pub(crate) struct DrawArgs {
     /// Draw the modes and what leads from one to another
     #[arg(long)]
     modes: bool,
-    /// Leave out what the wires carry
+    /// Leave out the text on the arrows
     #[arg(long)]
     plain: bool,
     /// Format of the picture

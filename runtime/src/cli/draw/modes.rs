@@ -80,9 +80,9 @@ fn condition(key: &str, exit: &Value) -> Vec<String> {
         lines.push(when + &is.into_iter().chain(bounds).collect::<String>());
         lines.extend(number("for_ms").map(|ms| format!("for {}", time(ms))));
     }
-    lines.extend(text("on").map(|word| format!("word {word}")));
+    lines.extend(text("on").map(|word| format!("on the word {word}")));
     lines.extend(number("after_ms").map(|ms| format!("after {}", time(ms))));
-    lines.extend(number("after_travel_mm").map(|mm| format!("after a way of {mm} mm")));
+    lines.extend(number("after_travel_mm").map(|mm| format!("after {mm} mm of travel")));
     lines
 }
 

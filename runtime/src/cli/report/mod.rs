@@ -1,6 +1,5 @@
 //! `report`: recordings and scenarios as one page for a browser, with everything in it.
 
-mod intervals;
 mod page;
 mod run;
 
@@ -19,8 +18,7 @@ use crate::recording::{Replay, ReplayChanges, ReplayError};
     after_help = "The page goes to the standard output. It is one file: it loads nothing, and prints well.
 
 A recording is replayed: the page has what `run` prints, the image and the curves of the ports that the graph
-shows, the graph, its modes and, of a run in real time, when its ticks began. A scenario runs, and its results stand
-beside those of the paper.
+shows, its modes and the graph. A scenario runs, and its results stand beside those of the paper.
 
 Examples:
   tactflow run graphs/hybrid.toml --record run.mcap

@@ -73,7 +73,9 @@ impl HtmlPage {
             self.put(format_args!("<tr{class}>{cells}</tr>"));
         }
         self.text.push_str("</table>\n");
-        self.listing(notes);
+        if !notes.trim().is_empty() {
+            self.listing(notes);
+        }
     }
 
     /// Ends the page.

@@ -2,7 +2,6 @@
 
 use std::time::Instant;
 
-use super::intervals::Intervals;
 use super::page::HtmlPage;
 use crate::cli::draw::{graph_svg, modes_svg};
 use crate::cli::run::summary::Summary;
@@ -20,7 +19,6 @@ pub(super) fn add(page: &mut HtmlPage, name: &str, mut replay: Replay) -> Result
     let mut summary = Summary::new(replay.engine(), false, None);
     // A graph that shows nothing has no picture.
     let mut still = Still::new(name, replay.engine()).ok();
-    let mut intervals = Intervals::default();
     let fault = without_panic_messages(|| {
         loop {
             match replay.step()? {
@@ -30,7 +28,6 @@ pub(super) fn add(page: &mut HtmlPage, name: &str, mut replay: Replay) -> Result
             }
             summary.add(replay.engine());
             still.iter_mut().for_each(|still| still.add(replay.engine()));
-            intervals.add(replay.engine().now());
         }
     })?;
     let engine = replay.engine();
@@ -43,9 +40,6 @@ pub(super) fn add(page: &mut HtmlPage, name: &str, mut replay: Replay) -> Result
     page.listing(&summary.render(engine, &outcome, style));
     if let Some(still) = still {
         page.picture(&still.text(engine), "The strongest image, and what the graph shows over time.");
-    }
-    if replay.recording().about().is_real {
-        page.picture(&intervals.svg(engine.period()), &intervals.caption(engine.period()));
     }
     add_graph(page, name, &replay, engine);
     Ok(difference(&replay))

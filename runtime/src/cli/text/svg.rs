@@ -20,7 +20,7 @@ impl Svg {
     pub fn new([width, height]: [f64; 2], title: &str) -> Self {
         let mut svg = Self { text: String::new() };
         svg.put(format_args!(
-            "{}xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 {width} {height}\" font-family=\"sans-serif\" \
+            "{}xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 {width:.0} {height:.0}\" font-family=\"sans-serif\" \
              font-size=\"13\">",
             Self::START
         ));

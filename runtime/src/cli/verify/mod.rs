@@ -180,10 +180,9 @@ fn prepare(args: &VerifyArgs, catalogue: &Catalogue) -> Result<Vec<Verified>, St
     let all: Vec<Verified> = files.into_iter().flat_map(load).collect();
     if let Some((folder, _)) = args.records() {
         let mut names = BTreeSet::new();
-        if let Some(twice) = all.iter().map(Verified::name).find(|name| !names.insert(name.clone())) {
-            return Err(format!(
-                "two scenarios are called `{twice}`, so their recordings would have the same name: rename a file"
-            ));
+        let mut recorded = all.iter().map(|verified| verified.name().replace(' ', "_"));
+        if let Some(twice) = recorded.find(|name| !names.insert(name.clone())) {
+            return Err(format!("two scenarios would be recorded as `{twice}`: rename a file"));
         }
         std::fs::create_dir_all(folder).map_err(|error| format!("cannot create `{}`: {error}", folder.display()))?;
     }

@@ -118,8 +118,8 @@ const TOUCH_N: f64 = 6.0;
 const HIT_N_S_PER_M: f64 = 480.0;
 /// How much larger a hit is than the push behind it [1]. A push F that begins or ends at once lets an arm of stiffness k and
 /// mass m swing by F / k about its rest, and one that does both by at most twice that. Such a swing throws the pad with
-/// 2 F / √(k m), and a foam of stiffness c stops it with √(c m) of that: 2 √(c / k), of 3 kN/m and of 77 kN/m.
-const THROW: f64 = 10.1;
+/// 2 F / √(k m), and a foam of stiffness c stops it with √(c m) of that: 2 √(c / k) = 10.13, of 3 kN/m and of 77 kN/m.
+const THROW: f64 = 10.2;
 
 impl Row {
     /// Returns what may come of the smallest severity in a phase.
@@ -194,7 +194,7 @@ impl Row {
         let force = match self.allowance {
             None => "ceiling + 6 N",
             Some(Allowance::OverGain) => "ceiling / gain + 6 N",
-            Some(Allowance::Throw) => "ceiling + 6 N + 10.1 times the push",
+            Some(Allowance::Throw) => "ceiling + 6 N + 10.2 times the push",
             Some(Allowance::Hit) => "ceiling + 6 N + 480 N s/m of the speed",
         };
         [self.name.clone(), grown, fates(&self.approach), fates(&self.contact), force.to_owned(), self.why.clone()]
