@@ -61,6 +61,8 @@ pub struct Replay {
     missing: BTreeSet<String>,
     ports: usize,
     ticks: u64,
+    /// Ticks whose ports the recording lacks.
+    uncompared: u64,
     differences: Differences,
 }
 
@@ -99,9 +101,9 @@ impl Replay {
         let own: BTreeSet<&str> = engine.ports().iter().map(|(port, _)| port.name.as_str()).collect();
         let missing = recorded.difference(&own).map(|port| (*port).to_owned()).collect();
         let ports = snapshot.ports();
-        let (epoch, ticks, differences) = (0, 0, Differences::default());
+        let (epoch, ticks, uncompared, differences) = (0, 0, 0, Differences::default());
         let mut replay =
-            Self { recording, engine, snapshot, channels, epoch, next, missing, ports, ticks, differences };
+            Self { recording, engine, snapshot, channels, epoch, next, missing, ports, ticks, uncompared, differences };
         replay.epoch = replay.epoch_of_file();
         Ok(replay)
     }
@@ -132,6 +134,7 @@ impl Replay {
             return Ok(ReplayedTick::Fault(fault.into()));
         }
         // The last tick of a file that was cut may lack some of its ports.
+        self.uncompared += u64::from(tick.is_missing);
         if tick.is_missing || (self.next.is_none() && !self.recording.is_complete()) {
             return Ok(ReplayedTick::Ran(true));
         }
@@ -181,6 +184,12 @@ impl Replay {
     #[must_use]
     pub const fn ticks(&self) -> u64 {
         self.ticks
+    }
+
+    /// Returns the number of ticks whose ports the recording lacks.
+    #[must_use]
+    pub const fn uncompared(&self) -> u64 {
+        self.uncompared
     }
 
     /// Returns the number of ports that are compared.

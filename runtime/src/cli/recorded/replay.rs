@@ -88,7 +88,7 @@ impl Run<'_> {
         let from = self.args.from.unwrap_or(0.0);
         let until = self.args.length.map_or(f64::INFINITY, |length| from + length);
         let mut shown = 0_u64;
-        without_panic_messages(|| {
+        let ran = without_panic_messages(|| {
             while self.replay.next_time().is_some_and(|time| seconds(time) <= until) {
                 match self.replay.step()? {
                     ReplayedTick::Over => break,
@@ -111,7 +111,13 @@ impl Run<'_> {
                 }
             }
             Ok::<(), String>(())
-        })?;
+        });
+        if let Err(message) = ran {
+            let count = count_of(shown as usize, "tick");
+            let (name, missing) = (self.args.recording.display(), self.missing());
+            shell.say(&format!("{name}: the first {count} are the same to the last bit{missing}"));
+            return Err(message);
+        }
         self.say_page(&summary, shell);
         if let (Some(path), Some(rows)) = (&self.args.out, rows) {
             if let Some(error) = rows.finish(|_| true).error {
@@ -181,8 +187,17 @@ impl Run<'_> {
         } else {
             String::new()
         };
-        shell.say(&format!("{name}: {ticks}, {ports}: the same to the last bit{cut}"));
+        let missing = self.missing();
+        shell.say(&format!("{name}: {ticks}, {ports}: the same to the last bit{missing}{cut}"));
         0
+    }
+
+    /// Says how many ticks could not be compared.
+    fn missing(&self) -> String {
+        match self.replay.uncompared() {
+            0 => String::new(),
+            count => format!("; the recording lacks the ports of {}", count_of(count as usize, "tick")),
+        }
     }
 
     /// Warns if another version of tactflow has recorded the run.
