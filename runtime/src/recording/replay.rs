@@ -4,7 +4,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use super::channels::{ChannelMessage, Channels, LOG, LOST, MODES};
+use super::channels::{ChannelMessage, Channels, LOG, LOST, MODES, TRANSFORMS};
 use super::compare::{Differences, PortMessage};
 use super::reader::{RecordedTick, Recording};
 use super::snapshot::Snapshot;
@@ -235,7 +235,7 @@ fn name_of<'c>(topic: &'c str, metadata: &'c BTreeMap<String, String>) -> &'c st
 /// Whether a name is that of a channel without a port.
 #[must_use]
 pub fn is_own_channel(name: &str) -> bool {
-    [MODES, LOST, LOG].contains(&name)
+    [MODES, LOST, LOG, TRANSFORMS].contains(&name)
 }
 
 /// Returns the request of a replay.
