@@ -5,6 +5,7 @@ mod chain;
 mod finger_press;
 mod fused;
 mod hand;
+mod recorded;
 
 use std::hint::black_box;
 use std::time::Instant;
@@ -58,6 +59,8 @@ const MOST_NODE: f64 = 10.0;
 const MOST_BARE: f64 = 1.25;
 /// The same with finite checks, sampled timing and the net that catches a panic.
 const MOST: f64 = 1.4;
+/// Greatest ratio of the time to record a tick of the hybrid task to the finger press fused by hand.
+const MOST_RECORDED: f64 = 1.7;
 
 /// Compares the graph with the fused function on the whole recording.
 fn same_bits() {
@@ -99,6 +102,27 @@ fn finger_press() {
             "finger press, a tick of the graph, {what}: {time:.0} ns, ratio {ratio:.3}, at most {most}: {verdict}"
         );
     }
+}
+
+/// Compares the time to record a tick of the hybrid task with the finger press fused by hand.
+fn recorded() {
+    const FRAME: usize = 150;
+    let mut pair = finger_press::Pair::new();
+    (0..=FRAME).for_each(|_| assert!(pair.step()));
+    let (cells, arm) = (pair.cells(FRAME).to_vec(), pair.arm());
+    let fused = &mut pair.fused;
+    let mut out = [0.0; 7];
+    let mut by_hand = || {
+        black_box(fused.tick(black_box(&cells), black_box([&arm[0][..], &arm[1][..]]), 0.1, 0.1, &mut out));
+        black_box((fused.sum, fused.peak, fused.is_stuck, out));
+    };
+    let fused = medians(&mut [&mut by_hand], 500)[0];
+    let time = recorded::recording();
+    let ratio = time / fused;
+    let verdict = if ratio <= MOST_RECORDED { "good" } else { "TOO MUCH" };
+    println!(
+        "hybrid, recording a tick: {time:.0} ns, {ratio:.3} of the finger press fused by hand ({fused:.0} ns), at most {MOST_RECORDED}: {verdict}"
+    );
 }
 
 /// Runs one of the two alone, for a tool that counts instructions: `tick -- graph 1000`.
@@ -159,6 +183,7 @@ fn main() {
             count_hand(pads.parse().expect("a number of pads"), ticks.parse().expect("a number of ticks"));
         }
         [what] if what == "same" => same_bits(),
+        [what] if what == "recorded" => recorded(),
         [what, ticks] => count(what, ticks.parse().expect("a number of ticks")),
         _ => {
             chains();

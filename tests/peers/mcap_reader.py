@@ -79,6 +79,8 @@ def main(path, table):
             cell = row[column]
             assert (float(cell) if cell else None) == (None if number is None else float(number)), (column, cell, number)
             numbers += 1
+    frames = {json.loads(m.data)["child_frame_id"] for _, c, m in messages if c.topic == "/tf"}
+    assert "pad" in frames, frames
     silent = {channel.topic for channel in summary.channels.values()} - decoded
     print(f"{len(ticks)} ticks, {len(decoded)} channels, {numbers} numbers, {images} images, silent: {sorted(silent)}")
 

@@ -1,5 +1,7 @@
 //! Quantities that no shipped port has: the runtime knows their rules and none of their names.
 
+use std::path::Path;
+
 use tactflow_runtime::catalogue::Catalogue;
 use tactflow_runtime::device::RoleType;
 use tactflow_runtime::harness::{FedRole, GraphRig};
@@ -113,7 +115,9 @@ fn a_quantity_is_known_passed_on_or_refused() {
 #[test]
 fn the_runtime_contains_no_name_of_a_quantity() {
     let sources = sources(&["runtime/src"]);
-    let sources = sources.iter().filter(|(path, _)| !path.ends_with("tests.rs"));
+    // The schemas of Foxglove have words of their own.
+    let is_own = |path: &Path| !path.ends_with("tests.rs") && !path.ends_with("recording/schema.rs");
+    let sources = sources.iter().filter(|(path, _)| is_own(path));
     let sources: String = sources.map(|(_, text)| code(text)).collect();
     let catalogue = tactflow_nodes::catalogue();
     let roles = catalogue.roles().iter().flat_map(|role| &role.outputs);

@@ -156,6 +156,29 @@ fn a_file_that_is_cut_anywhere_opens_and_is_recovered() {
     assert!(replayed > 100);
 }
 
+#[test]
+fn a_damaged_recording_never_panics() {
+    let folder = tempfile::tempdir().unwrap();
+    let [path, damaged] = ["run.mcap", "damaged.mcap"].map(|name| folder.path().join(name));
+    record_here(&Request::file(workspace().join("graphs/finger_press.toml")), &path, 40);
+    let bytes = fs::read(&path).unwrap();
+    // Most of the damage is in the ticks, because the files before them have checksums.
+    let data = bytes.windows(16).position(|window| window == b"/tactflow/inputs").unwrap();
+    let (mut random, mut refused) = (Random::new(7, 0), 0);
+    for round in 0..120 {
+        let mut spoilt = bytes.clone();
+        let from = if round % 4 == 0 { 0 } else { data };
+        for _ in 0..1 + round % 5 {
+            let at = from + random.below(bytes.len() - from);
+            spoilt[at] ^= 1 << random.below(8);
+        }
+        fs::write(&damaged, &spoilt).unwrap();
+        let replayed = std::panic::catch_unwind(|| ticks_of_replay(&damaged));
+        refused += usize::from(replayed.unwrap_or_else(|_| panic!("round {round}")).is_err());
+    }
+    assert!(refused > 60, "{refused} of 120 are refused or differ");
+}
+
 #[cfg(unix)]
 #[test]
 fn a_run_that_is_killed_loses_at_most_a_second() {
@@ -221,6 +244,10 @@ fn what_is_written_too_slowly_is_counted_and_the_file_says_from_where() {
     assert_eq!((recorded.first_lost, recorded.lost), (Some(first), 1), "{recorded:?}");
     let replayed = ticks_of_replay(&path).unwrap_err();
     assert!(replayed.contains(&format!("cannot be replayed from tick {first} on")), "{replayed}");
+    let said = say(&["replay", path.to_str().unwrap(), "-q"]);
+    let before =
+        format!("the first {} ticks are the same to the last bit; the recording lacks the ports of ", first - 1);
+    assert!(said.code == 2 && said.out.contains(&before), "{}{}", said.out, said.err);
     let text = String::from_utf8_lossy(&fs::read(&path).unwrap()).into_owned();
     assert!(text.contains("not_replayable_from_tick"));
 }

@@ -199,7 +199,14 @@ fn what_is_no_recording_and_what_has_no_effect_is_said() {
     fs::write(&text, "no recording at all").unwrap();
     let head = folder.path().join("head.mcap");
     fs::write(&head, &fs::read(&path).unwrap()[..60]).unwrap();
-    let cases: [(&[&str], &str); 5] = [
+    let notes = folder.path().join("notes.csv");
+    fs::write(&notes, "notes of yesterday").unwrap();
+    let (run, notes) = (path.to_str().unwrap(), notes.to_str().unwrap());
+    let cases: [(&[&str], &str); 9] = [
+        (&["replay", run, "--out", notes], "is not a recording of a run, so it is not overwritten"),
+        (&["export", run, notes], "is not an export, so it is not overwritten"),
+        (&["export", run, "run.txt"], "does not end in .csv or .npz: write for example `run.npz`"),
+        (&["diff", run, "/nowhere.mcap"], "cannot open `/nowhere.mcap`"),
         (&["replay", "/nowhere.mcap"], "cannot open `/nowhere.mcap`"),
         (&["replay", text.to_str().unwrap()], "is no MCAP file"),
         (&["replay", head.to_str().unwrap()], "is no recording of tactflow, or was cut at its start"),

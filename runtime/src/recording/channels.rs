@@ -1,8 +1,9 @@
 //! The channels of a recording: one for the inputs, a few for what happened, and one for each recorded port.
 
 use std::collections::BTreeMap;
+use std::fmt::Write;
 
-use super::json::{PortText, put_timestamp, quoted_json};
+use super::json::{PortText, put_timestamp, quoted_json, scalar_key};
 use super::schema::{Schema, number, present_number};
 use super::snapshot::{EVENT, PORT, TASK};
 use crate::engine::Engine;
@@ -18,6 +19,8 @@ pub(crate) const MISSING: &str = "/tactflow/missing";
 pub(crate) const MODES: &str = "/tactflow/modes";
 /// Topic of the ports that became absent and whose schema cannot say so.
 pub(crate) const LOST: &str = "/tactflow/lost";
+/// Topic of the frames that poses move.
+pub(crate) const TRANSFORMS: &str = "/tf";
 /// Topic of the events of a run.
 pub(crate) const LOG: &str = "/log";
 /// Encoding of the inputs. Its number changes with the bytes.
@@ -62,6 +65,8 @@ struct PortChannel {
     kind: Kind,
     slot: u32,
     text: PortText,
+    /// The frame that the port moves, as JSON, if it is the first pose of that frame in another one.
+    moves: Option<String>,
 }
 
 /// Index of each channel that is not that of a port.
@@ -69,6 +74,7 @@ pub(crate) const MISSING_CHANNEL: usize = 1;
 const MODES_CHANNEL: usize = 2;
 const LOST_CHANNEL: usize = 3;
 const LOG_CHANNEL: usize = 4;
+const TRANSFORMS_CHANNEL: usize = 5;
 
 /// A message: its channel, the time of its sample in the graph's clock \[ns\], and its JSON.
 pub(crate) struct ChannelMessage<'m> {
@@ -111,7 +117,13 @@ impl Channels {
         let metadata = metadata.into_iter().map(|(key, value)| (key.to_owned(), value)).collect();
         let topic = format!("/{}", port.name.replace('.', "/"));
         self.list.push(Channel { topic, schema: Some(schema(port)), encoding: "json", metadata });
+        let moves = match (kind, port.frames.as_slice()) {
+            (Kind::Pose, [Some(frame), Some(parent)]) if frame != parent => Some(quoted_json(frame)),
+            _ => None,
+        };
+        let is_moved = |frame: &String| self.ports.iter().flatten().any(|port| port.moves.as_ref() == Some(frame));
         PortChannel {
+            moves: moves.filter(|frame| !is_moved(frame)),
             channel: self.list.len() - 1,
             name: quoted_json(&port.name),
             kind,
@@ -128,45 +140,39 @@ impl Channels {
         epoch: i64,
         emit: &mut impl FnMut(ChannelMessage<'_>) -> Result<(), E>,
     ) -> Option<Result<(), E>> {
-        use std::fmt::Write;
         let mut reader = ByteReader(snapshot);
         let (_, now) = (reader.u64()?, reader.i64()?);
         let mut text = std::mem::take(&mut self.text);
         while !reader.0.is_empty() {
             text.clear();
+            let mut moving = None;
             let (channel, stamp) = match reader.u8()? {
                 TASK => {
-                    let task = self.tasks.get(usize::from(reader.u16()?))?;
-                    let (number, mode) = (reader.u16()?, reader.text()?);
-                    let (mode, number) = match mode {
-                        "" => ("null".to_owned(), "null".to_owned()),
-                        mode => (quoted_json(mode), number.to_string()),
-                    };
-                    let (halted, end) = (reader.u8()? != 0, reader.u8()?);
-                    let end = ["null", "\"done\"", "\"failed\""].get(usize::from(end))?;
-                    let (t, task) = (seconds_text(now), quoted_json(task));
-                    // Writing to a string cannot fail.
-                    let _ = write!(
-                        text,
-                        "{{\"t\":{t},\"task\":{task},\"mode\":{mode},\"number\":{number},\"halted\":{halted},\"end\":{end}}}"
-                    );
+                    write_task(&self.tasks, &mut reader, now, &mut text)?;
                     (MODES_CHANNEL, now)
                 }
                 EVENT => {
-                    let (level, message) = (reader.u8()?, quoted_json(reader.text()?));
-                    text.push('{');
-                    put_timestamp(&mut text, epoch + now);
-                    let _ = write!(
-                        text,
-                        ",\"level\":{level},\"message\":{message},\"name\":\"tactflow\",\"file\":\"\",\"line\":0}}"
-                    );
+                    write_event(&mut reader, epoch + now, &mut text)?;
                     (LOG_CHANNEL, now)
                 }
-                PORT => self.port(&mut reader, [now, epoch], &mut text)?,
+                PORT => {
+                    let port = usize::from(ByteReader(reader.0).u16()?);
+                    let written = self.port(&mut reader, [now, epoch], &mut text)?;
+                    moving = self.ports.get(port)?.as_ref().filter(|port| port.channel == written.0);
+                    written
+                }
                 _ => return None,
             };
             if let Err(error) = emit(ChannelMessage { channel, stamp, data: text.as_bytes() }) {
                 return Some(Err(error));
+            }
+            if let Some((port, frame)) = moving.and_then(|port| Some((port, port.moves.as_ref()?))) {
+                text.clear();
+                port.text.write_transform(frame, epoch + now, &mut text);
+                let transform = ChannelMessage { channel: TRANSFORMS_CHANNEL, stamp, data: text.as_bytes() };
+                if let Err(error) = emit(transform) {
+                    return Some(Err(error));
+                }
             }
         }
         self.text = text;
@@ -182,12 +188,38 @@ impl Channels {
         if is_present {
             self.arenas.read_bytes(port.kind, port.slot, reader)?;
         } else if !PortText::has_null(port.kind) {
-            text.push_str(&format!("{{\"t\":{},\"port\":{}}}", seconds_text(now), port.name));
+            let _ = write!(text, "{{\"t\":{},\"port\":{}}}", seconds_text(now), port.name);
             return Some((LOST_CHANNEL, now));
         }
         port.text.write(&self.arenas, is_present.then_some(port.slot), [now, epoch + now], text);
         Some((port.channel, stamp))
     }
+}
+
+/// Writes the mode, the halt and the end of a task.
+fn write_task(tasks: &[String], reader: &mut ByteReader<'_>, now: i64, text: &mut String) -> Option<()> {
+    let task = quoted_json(tasks.get(usize::from(reader.u16()?))?);
+    let (number, mode) = (reader.u16()?, reader.text()?);
+    let (mode, number) = match mode {
+        "" => ("null".to_owned(), "null".to_owned()),
+        mode => (quoted_json(mode), number.to_string()),
+    };
+    let (is_halted, end) = (reader.u8()? != 0, reader.u8()?);
+    let end = ["null", "\"done\"", "\"failed\""].get(usize::from(end))?;
+    // Writing to a string cannot fail.
+    let _ = write!(text, "{{\"t\":{},\"task\":{task},\"mode\":{mode},\"number\":{number},", seconds_text(now));
+    let _ = write!(text, "\"halted\":{is_halted},\"end\":{end}}}");
+    Some(())
+}
+
+/// Writes an event at a time of the file \[ns\].
+fn write_event(reader: &mut ByteReader<'_>, time: i64, text: &mut String) -> Option<()> {
+    let (level, message) = (reader.u8()?, quoted_json(reader.text()?));
+    text.push('{');
+    put_timestamp(text, time);
+    let rest = "\"name\":\"tactflow\",\"file\":\"\",\"line\":0";
+    let _ = write!(text, ",\"level\":{level},\"message\":{message},{rest}}}");
+    Some(())
 }
 
 /// The channels before those of the ports.
@@ -217,6 +249,7 @@ fn own_channels() -> Vec<Channel> {
             Schema::object("tactflow.Lost", "A port that became absent", &[time(), ("port", text("Its name"))]),
         ),
         Channel::json(LOG, Schema::log()),
+        Channel::json(TRANSFORMS, Schema::frame_transform()),
     ]
 }
 
@@ -246,10 +279,7 @@ fn schema(port: &PlannedPort) -> Schema {
         shape => {
             let scalars = shape.scalars();
             let property = |(name, unit): &(String, crate::signal::Unit)| {
-                (
-                    if name.is_empty() { "value".to_owned() } else { name.clone() },
-                    number(&format!("[{unit}]; null while it is absent")),
-                )
+                (scalar_key(name).to_owned(), number(&format!("[{unit}]; null while it is absent")))
             };
             let properties: Vec<(String, serde_json::Value)> = scalars.iter().map(property).collect();
             let properties = properties.iter().map(|(name, value)| (name.as_str(), value.clone()));

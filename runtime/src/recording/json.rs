@@ -2,6 +2,7 @@
 
 use std::fmt::Write;
 
+use super::schema::{ORIENTATION, POSITION};
 use crate::record::seconds_text;
 use crate::signal::{Arenas, Flag, Image, Jacobian, Kind, Mask, Regions, Shape, Signal};
 
@@ -12,6 +13,16 @@ pub(crate) struct PortText {
     names: Vec<String>,
     frame: String,
     row: Vec<f64>,
+}
+
+/// Returns the key of a scalar of a port in its messages: the name of a component, and `value` for one without a name.
+/// `t` is the time.
+pub(crate) fn scalar_key(name: &str) -> &str {
+    match name {
+        "" => "value",
+        "t" => "t_",
+        name => name,
+    }
 }
 
 /// Writes a number; one that is not finite is null.
@@ -34,7 +45,7 @@ pub(crate) fn put_timestamp(out: &mut String, nanos: i64) {
 impl PortText {
     pub(crate) fn new(shape: &Shape, frames: &[Option<String>]) -> Self {
         let scalars = shape.scalars();
-        let name = |name: &String| format!(",{}:", quoted_json(if name.is_empty() { "value" } else { name }));
+        let name = |name: &String| format!(",{}:", quoted_json(scalar_key(name)));
         // The frame of a pose is the one in which it is written.
         let frame = frames.get(usize::from(shape.kind() == Kind::Pose)).cloned().flatten().unwrap_or_default();
         Self {
@@ -62,7 +73,7 @@ impl PortText {
                 let mask = &Mask::arena(arenas)[slot as usize];
                 let (rows, cols) = (mask.rows(), mask.cols());
                 let cells = (0..rows).flat_map(|i| (0..cols).map(move |j| u8::from(mask.contains(i, j))));
-                self.grid(shape.pitch, [rows, cols], ("contact", 1, 1), cells, time, out);
+                self.grid(shape.pitch, [rows, cols], ("mask", 1, 1), cells, time, out);
             }
             (Shape::Pose(_), Some(slot)) => {
                 arenas.read_scalars(Kind::Pose, slot, 0, &mut self.row);
@@ -98,10 +109,21 @@ impl PortText {
         out.push('{');
         put_timestamp(out, time);
         let _ = write!(out, ",\"frame_id\":{},\"pose\":{{", self.frame);
-        put_vector(out, "position", &["x", "y", "z"], &self.row[..3]);
+        put_vector(out, POSITION, &["x", "y", "z"], &self.row[..3]);
         out.push(',');
-        put_vector(out, "orientation", &["x", "y", "z", "w"], &self.row[3..]);
+        put_vector(out, ORIENTATION, &["x", "y", "z", "w"], &self.row[3..]);
         out.push_str("}}");
+    }
+
+    /// Writes the pose that was written last as the transform of a frame in its parent.
+    pub(crate) fn write_transform(&self, child: &str, time: i64, out: &mut String) {
+        out.push('{');
+        put_timestamp(out, time);
+        let _ = write!(out, ",\"parent_frame_id\":{},\"child_frame_id\":{child},", self.frame);
+        put_vector(out, "translation", &["x", "y", "z"], &self.row[..3]);
+        out.push(',');
+        put_vector(out, "rotation", &["x", "y", "z", "w"], &self.row[3..]);
+        out.push('}');
     }
 
     /// Writes a grid whose middle is the origin of its frame. `field` is the name, the size and the type of a cell.
@@ -119,9 +141,9 @@ impl PortText {
         put_timestamp(out, time);
         let _ = write!(out, ",\"frame_id\":{},\"pose\":{{", self.frame);
         let corner = [-(cols as f64) * pitch[0] / 2.0, -(rows as f64) * pitch[1] / 2.0, 0.0];
-        put_vector(out, "position", &["x", "y", "z"], &corner);
+        put_vector(out, POSITION, &["x", "y", "z"], &corner);
         out.push(',');
-        put_vector(out, "orientation", &["x", "y", "z", "w"], &[0.0, 0.0, 0.0, 1.0]);
+        put_vector(out, ORIENTATION, &["x", "y", "z", "w"], &[0.0, 0.0, 0.0, 1.0]);
         let _ = write!(out, "}},\"column_count\":{cols},");
         put_vector(out, "cell_size", &["x", "y"], &pitch);
         let _ = write!(out, ",\"row_stride\":{},\"cell_stride\":{size},", cols * size);
@@ -235,6 +257,18 @@ mod tests {
         put_base64(&mut text, all.iter().copied());
         assert_eq!(base64(&text), Some(all));
         assert_eq!(base64("a b="), None);
+    }
+
+    #[test]
+    fn a_feature_that_is_called_as_the_time_has_another_key() {
+        let unit = crate::signal::Unit::ONE;
+        let shape = crate::signal::FeaturesShape::new([("t", unit), ("x", unit)]);
+        let mut arenas = Arenas::default();
+        let slot = arenas.add(&shape.clone().into());
+        crate::signal::Features::arena_mut(&mut arenas)[0].fill(&[Some(0.5), None]);
+        let mut text = String::new();
+        PortText::new(&shape.into(), &[None]).write(&arenas, Some(slot), [1_500_000_000, 0], &mut text);
+        assert_eq!(text, "{\"t\":1.5,\"t_\":0.5,\"x\":null}");
     }
 
     #[test]

@@ -4,7 +4,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use super::channels::{ChannelMessage, Channels, LOG, LOST, MODES};
+use super::channels::{ChannelMessage, Channels, LOG, LOST, MODES, TRANSFORMS};
 use super::compare::{Differences, PortMessage};
 use super::reader::{RecordedTick, Recording};
 use super::snapshot::Snapshot;
@@ -62,6 +62,8 @@ pub struct Replay {
     missing: BTreeSet<String>,
     ports: usize,
     ticks: u64,
+    /// Ticks whose ports the recording lacks.
+    uncompared: u64,
     differences: Differences,
 }
 
@@ -101,9 +103,21 @@ impl Replay {
         let own: BTreeSet<&str> = engine.ports().iter().map(|(port, _)| port.name.as_str()).collect();
         let missing = recorded.difference(&own).map(|port| (*port).to_owned()).collect();
         let ports = snapshot.ports();
-        let (epoch, ticks, differences) = (0, 0, Differences::default());
-        let mut replay =
-            Self { recording, outline, engine, snapshot, channels, epoch, next, missing, ports, ticks, differences };
+        let (epoch, ticks, uncompared, differences) = (0, 0, 0, Differences::default());
+        let mut replay = Self {
+            recording,
+            outline,
+            engine,
+            snapshot,
+            channels,
+            epoch,
+            next,
+            missing,
+            ports,
+            ticks,
+            uncompared,
+            differences,
+        };
         replay.epoch = replay.epoch_of_file();
         Ok(replay)
     }
@@ -134,6 +148,7 @@ impl Replay {
             return Ok(ReplayedTick::Fault(fault.into()));
         }
         // The last tick of a file that was cut may lack some of its ports.
+        self.uncompared += u64::from(tick.is_missing);
         if tick.is_missing || (self.next.is_none() && !self.recording.is_complete()) {
             return Ok(ReplayedTick::Ran(true));
         }
@@ -191,6 +206,12 @@ impl Replay {
         self.ticks
     }
 
+    /// Returns the number of ticks whose ports the recording lacks.
+    #[must_use]
+    pub const fn uncompared(&self) -> u64 {
+        self.uncompared
+    }
+
     /// Returns the number of ports that are compared.
     #[must_use]
     pub const fn ports(&self) -> usize {
@@ -234,7 +255,7 @@ fn name_of<'c>(topic: &'c str, metadata: &'c BTreeMap<String, String>) -> &'c st
 /// Whether a name is that of a channel without a port.
 #[must_use]
 pub fn is_own_channel(name: &str) -> bool {
-    [MODES, LOST, LOG].contains(&name)
+    [MODES, LOST, LOG, TRANSFORMS].contains(&name)
 }
 
 /// Returns the request of a replay.

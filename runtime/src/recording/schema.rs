@@ -2,6 +2,10 @@
 
 use serde_json::{Map, Value, json};
 
+/// The parts of a pose in the schemas of Foxglove.
+pub(crate) const POSITION: &str = "position";
+pub(crate) const ORIENTATION: &str = "orientation";
+
 /// The name and the text of a schema.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(crate) struct Schema {
@@ -45,6 +49,19 @@ impl Schema {
         let frame = json!({"type": "string", "description": "Frame of reference for pose position and orientation"});
         let properties = [("timestamp", time()), ("frame_id", frame), ("pose", pose())];
         Self::object("foxglove.PoseInFrame", "A timestamped pose in 3D space", &properties)
+    }
+
+    /// The schema of the frames that poses move, `foxglove.FrameTransform`.
+    pub(crate) fn frame_transform() -> Self {
+        let frame = |what: &str| json!({"type": "string", "description": what});
+        let properties = [
+            ("timestamp", time()),
+            ("parent_frame_id", frame("Name of the parent frame")),
+            ("child_frame_id", frame("Name of the child frame")),
+            ("translation", vector("foxglove.Vector3", &["x", "y", "z"])),
+            ("rotation", vector("foxglove.Quaternion", &["x", "y", "z", "w"])),
+        ];
+        Self::object("foxglove.FrameTransform", "A transform between two reference frames in 3D space", &properties)
     }
 
     /// The schema of events, `foxglove.Log`.
@@ -96,7 +113,7 @@ fn vector(title: &str, axes: &[&str]) -> Value {
 fn pose() -> Value {
     let position = vector("foxglove.Vector3", &["x", "y", "z"]);
     let orientation = vector("foxglove.Quaternion", &["x", "y", "z", "w"]);
-    object("foxglove.Pose", &[("position", position), ("orientation", orientation)])
+    object("foxglove.Pose", &[(POSITION, position), (ORIENTATION, orientation)])
 }
 
 fn one_of(title: &str, names: &[&str]) -> Value {

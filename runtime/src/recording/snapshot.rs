@@ -83,10 +83,12 @@ impl Snapshot {
             if !mark.changed_in(tick) {
                 continue;
             }
-            bytes.push(PORT);
-            bytes.extend_from_slice(&number.to_le_bytes());
-            bytes.push(u8::from(mark.is_present()));
-            bytes.extend_from_slice(&mark.stamp().nanos.to_le_bytes());
+            let mut head = [0; 12];
+            head[0] = PORT;
+            head[1..3].copy_from_slice(&number.to_le_bytes());
+            head[3] = u8::from(mark.is_present());
+            head[4..].copy_from_slice(&mark.stamp().nanos.to_le_bytes());
+            bytes.extend_from_slice(&head);
             if mark.is_present() {
                 bus.arenas.write_bytes(*kind, id.slot, bytes);
             }

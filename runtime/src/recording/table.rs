@@ -5,7 +5,9 @@ use std::collections::BTreeMap;
 use serde_json::Value;
 
 use super::channels::{LOST, MODES};
+use super::json::scalar_key;
 use super::reader::{RecordedTick, Recording};
+use super::schema::{ORIENTATION, POSITION};
 use crate::engine::Engine;
 use crate::record::PortColumn;
 use crate::signal::Unit;
@@ -102,15 +104,15 @@ pub(super) fn lost_port(data: &[u8]) -> Option<String> {
 fn read<'n>(data: &[u8], kind: &str, names: impl Iterator<Item = &'n str>, cells: &mut [f64]) {
     let message: Value = serde_json::from_slice(data).unwrap_or_default();
     if kind == "pose" {
-        let parts = [("position", "x"), ("position", "y"), ("position", "z")];
-        let turns = [("orientation", "x"), ("orientation", "y"), ("orientation", "z"), ("orientation", "w")];
+        let parts = [(POSITION, "x"), (POSITION, "y"), (POSITION, "z")];
+        let turns = [(ORIENTATION, "x"), (ORIENTATION, "y"), (ORIENTATION, "z"), (ORIENTATION, "w")];
         for (cell, (part, axis)) in cells.iter_mut().zip(parts.into_iter().chain(turns)) {
             *cell = message["pose"][part][axis].as_f64().unwrap_or(f64::NAN);
         }
         return;
     }
     for (cell, name) in cells.iter_mut().zip(names) {
-        *cell = match &message[if name.is_empty() { "value" } else { name }] {
+        *cell = match &message[scalar_key(name)] {
             Value::Bool(flag) => f64::from(u8::from(*flag)),
             value => value.as_f64().unwrap_or(f64::NAN),
         };

@@ -98,18 +98,10 @@ fn put_count(out: &mut Vec<u8>, count: usize) {
 }
 
 fn put_f64s(out: &mut Vec<u8>, values: &[f64]) {
-    let room = room(out, 8 * values.len());
-    for (bytes, value) in room.chunks_exact_mut(8).zip(values) {
-        bytes.copy_from_slice(&value.to_le_bytes());
-    }
+    out.extend_from_slice(bytemuck::cast_slice(values));
 }
 
-/// Returns the next `bytes` bytes, which are zero.
-fn room(out: &mut Vec<u8>, bytes: usize) -> &mut [u8] {
-    let start = out.len();
-    out.resize(start + bytes, 0);
-    &mut out[start..]
-}
+const _: () = assert!(cfg!(target_endian = "little"), "slices of numbers are written as they are in memory");
 
 impl Arenas {
     /// Appends the bytes of a value of `kind`. Allocates nothing if `out` has the capacity.
@@ -130,16 +122,13 @@ impl Arenas {
                 let image = &Image::arena(self)[slot];
                 put_count(out, image.rows());
                 put_count(out, image.cols());
-                let room = room(out, 4 * image.cells().len());
-                for (bytes, value) in room.chunks_exact_mut(4).zip(image.cells()) {
-                    bytes.copy_from_slice(&value.to_le_bytes());
-                }
+                out.extend_from_slice(bytemuck::cast_slice(image.cells()));
             }
             Kind::Mask => {
                 let mask = &Mask::arena(self)[slot];
                 put_count(out, mask.rows());
                 put_count(out, mask.cols());
-                mask.words().iter().for_each(|word| out.extend_from_slice(&word.to_le_bytes()));
+                out.extend_from_slice(bytemuck::cast_slice(mask.words()));
             }
             Kind::Regions => write_regions(&Regions::arena(self)[slot], out),
             Kind::Twist => put_f64s(out, Twist::arena(self)[slot].0.as_slice()),

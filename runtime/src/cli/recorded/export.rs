@@ -2,6 +2,7 @@
 
 use std::path::PathBuf;
 
+use crate::cli::run::target::refuse_other;
 use crate::cli::shell::Shell;
 use crate::cli::text::number::count_of;
 use crate::recording;
@@ -25,6 +26,9 @@ pub(super) struct ExportArgs {
 }
 
 pub(super) fn export(args: ExportArgs, shell: &Shell) -> u8 {
+    if let Err(message) = refuse_other(&args.out, &[b"# time [s]", b"PK\x03\x04"], "an export") {
+        return shell.refuse(message);
+    }
     match recording::export(&args.recording, &args.out) {
         Ok(exported) => {
             let (ticks, columns) = (count_of(exported.ticks as usize, "tick"), count_of(exported.columns, "column"));

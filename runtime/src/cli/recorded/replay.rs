@@ -6,6 +6,7 @@ use std::time::Instant;
 use super::{difference_table, first};
 use crate::cli::run::duration;
 use crate::cli::run::summary::Summary;
+use crate::cli::run::target::refuse_other;
 use crate::cli::shell::panics::without_panic_messages;
 use crate::cli::shell::{FAULTED, NOT_LOADED, Shell};
 use crate::cli::text::number::{count_of, seconds};
@@ -51,8 +52,11 @@ pub(super) struct ReplayArgs {
     /// Record all ports in a .csv or .ndjson file: one row per tick, one column per number
     #[arg(short, long, value_name = "FILE")]
     out: Option<PathBuf>,
+    /// Print all ports instead of what the graph shows
+    #[arg(long)]
+    ports: bool,
     /// Print only the result of the comparison
-    #[arg(short, long)]
+    #[arg(short, long, conflicts_with = "ports")]
     quiet: bool,
 }
 
@@ -84,11 +88,11 @@ struct Run<'a> {
 impl Run<'_> {
     fn run(mut self, shell: &Shell) -> Result<u8, String> {
         let mut rows = self.rows()?;
-        let mut summary = Summary::new(self.replay.engine(), false, None);
+        let mut summary = Summary::new(self.replay.engine(), self.args.ports, None);
         let from = self.args.from.unwrap_or(0.0);
         let until = self.args.length.map_or(f64::INFINITY, |length| from + length);
         let mut shown = 0_u64;
-        without_panic_messages(|| {
+        let ran = without_panic_messages(|| {
             while self.replay.next_time().is_some_and(|time| seconds(time) <= until) {
                 match self.replay.step()? {
                     ReplayedTick::Over => break,
@@ -111,7 +115,13 @@ impl Run<'_> {
                 }
             }
             Ok::<(), String>(())
-        })?;
+        });
+        if let Err(message) = ran {
+            let count = count_of(shown as usize, "tick");
+            let (name, missing) = (self.args.recording.display(), self.missing());
+            shell.say(&format!("{name}: the first {count} are the same to the last bit{missing}"));
+            return Err(message);
+        }
         self.say_page(&summary, shell);
         if let (Some(path), Some(rows)) = (&self.args.out, rows) {
             if let Some(error) = rows.finish(|_| true).error {
@@ -127,6 +137,7 @@ impl Run<'_> {
         let format = RecordFormat::of(path).ok_or_else(|| {
             format!("`{}` does not end in .csv or .ndjson: write for example `--out part.csv`", path.display())
         })?;
+        refuse_other(path, &RecordFormat::FILE_STARTS.map(str::as_bytes), "a recording of a run")?;
         let rows = Recorder::create(path, format.rows(false), self.replay.engine());
         rows.map(Some).map_err(|error| format!("cannot create `{}`: {error}", path.display()))
     }
@@ -181,8 +192,17 @@ impl Run<'_> {
         } else {
             String::new()
         };
-        shell.say(&format!("{name}: {ticks}, {ports}: the same to the last bit{cut}"));
+        let missing = self.missing();
+        shell.say(&format!("{name}: {ticks}, {ports}: the same to the last bit{missing}{cut}"));
         0
+    }
+
+    /// Says how many ticks could not be compared.
+    fn missing(&self) -> String {
+        match self.replay.uncompared() {
+            0 => String::new(),
+            count => format!("; the recording lacks the ports of {}", count_of(count as usize, "tick")),
+        }
     }
 
     /// Warns if another version of tactflow has recorded the run.

@@ -10,7 +10,7 @@ mod ports;
 mod progress;
 mod slow;
 pub(super) mod summary;
-mod target;
+pub(super) mod target;
 mod time;
 #[cfg(feature = "mcap")]
 mod whole;

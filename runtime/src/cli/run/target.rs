@@ -50,7 +50,10 @@ pub(crate) fn clear(path: &Path, file: &OutputFile) -> Result<(), String> {
 }
 
 /// Refuses to overwrite a file that does not begin like the output of a run, such as a recording that is being played.
-fn refuse_other(path: &Path, starts: &[&[u8]], what: &str) -> Result<(), String> {
+///
+/// # Errors
+/// Returns a message if it does not.
+pub(crate) fn refuse_other(path: &Path, starts: &[&[u8]], what: &str) -> Result<(), String> {
     // A pipe has nothing to overwrite, and reading it waits for its writer.
     if is_special(path) {
         return Ok(());

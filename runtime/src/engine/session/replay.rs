@@ -81,6 +81,10 @@ impl Engine {
             }
             TICK => {
                 let (_, now, late) = (reader.u64()?, reader.i64()?, reader.i64()?);
+                let is_next = self.ticks() == 0 || now > self.now();
+                if !is_next || !is_time(now) || !is_time(late) {
+                    return None;
+                }
                 if late > 0 {
                     self.begin_late(late);
                 }
@@ -116,6 +120,15 @@ impl Engine {
     }
 }
 
+/// Largest time of an input [ns], and largest sequence number: others are damaged, and sums of them would overflow.
+const MAX_TIME: u64 = 1 << 60;
+const MAX_SEQUENCE: u64 = 1 << 48;
+
+/// Whether a number can be a time [ns].
+const fn is_time(nanos: i64) -> bool {
+    nanos.unsigned_abs() < MAX_TIME
+}
+
 /// An item that was carried out.
 enum Item {
     /// The time of the tick [ns].
@@ -133,6 +146,9 @@ fn apply_port(device: &mut DeviceSlot, reader: &mut ByteReader<'_>) -> Option<()
     let has_value = reader.u8()? != 0;
     sample.stamp = reader.i64()?;
     (sample.sequence, sample.writes, sample.losses) = (reader.u64()?, reader.u64()?, reader.u64()?);
+    if !is_time(sample.stamp) || sample.sequence > MAX_SEQUENCE {
+        return None;
+    }
     let loss = reader.text()?;
     if !loss.is_empty() || sample.state == SampleState::Lost {
         sample.loss = loss.to_owned().into();
