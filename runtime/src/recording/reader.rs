@@ -5,34 +5,29 @@ use std::fs::File;
 use std::io::{BufReader, Read};
 use std::path::{Path, PathBuf};
 
-use mcap::McapError;
-use mcap::records::{Channel, ChunkHeader, Record, op};
-use mcap::sans_io::linear_reader::{LinearReadEvent, LinearReader, LinearReaderOptions};
+use mcap::records::{Channel, Record, op};
 
 use super::about::{Contents, RunAbout};
 use super::channels::{INPUTS, INPUTS_ENCODING, KIND_KEY, MISSING, PORT_KEY, UNITS_KEY};
 use super::writer::{ABOUT, END, MODES_KEY, NEXT, NEXT_FILE};
 
-/// Longest record that is read [bytes].
-const MAX_RECORD: usize = 1 << 30;
+/// The first bytes of a file.
+const MAGIC: &[u8; 8] = b"\x89MCAP0\r\n";
 /// Size of the buffer [bytes].
 const BUFFER_BYTES: usize = 1 << 20;
 
-/// The records of a file, in their order.
+/// The records of a file, in their order, and those of its chunks. The library parses them; it is not given a file, since
+/// its reader trusts the lengths in it.
 pub(super) struct Records {
     path: PathBuf,
     file: BufReader<File>,
-    reader: LinearReader,
+    has_begun: bool,
+    record: Vec<u8>,
     chunk: Chunk,
     /// Whether the file has ended as a whole file does.
     is_complete: bool,
-    is_over: bool,
-}
-
-/// Returns the length of the longest record that a file can have [bytes]. A pipe has no length.
-fn longest_record(file: &File) -> usize {
-    let length = file.metadata().ok().filter(std::fs::Metadata::is_file).map(|file| file.len());
-    length.and_then(|length| usize::try_from(length).ok()).map_or(MAX_RECORD, |length| length.min(MAX_RECORD))
+    /// Whether the file has ended in another place.
+    is_cut: bool,
 }
 
 impl Records {
@@ -42,12 +37,9 @@ impl Records {
     /// If it cannot be opened.
     pub(super) fn open(path: &Path) -> Result<Self, String> {
         let file = File::open(path).map_err(|error| format!("cannot open `{}`: {error}", path.display()))?;
-        let options = LinearReaderOptions::default()
-            .with_skip_end_magic(true)
-            .with_emit_chunks(true)
-            .with_record_length_limit(longest_record(&file));
-        let (file, reader) = (BufReader::with_capacity(BUFFER_BYTES, file), LinearReader::new_with_options(options));
-        Ok(Self { path: path.to_owned(), file, reader, chunk: Chunk::default(), is_complete: false, is_over: false })
+        let (file, record) = (BufReader::with_capacity(BUFFER_BYTES, file), Vec::new());
+        let (path, chunk) = (path.to_owned(), Chunk::default());
+        Ok(Self { path, file, has_begun: false, record, chunk, is_complete: false, is_cut: false })
     }
 
     /// Passes the next record of the data to `take`, and returns what it makes of it. `None` at the end of the data or at
@@ -56,41 +48,60 @@ impl Records {
     /// # Errors
     /// If the file is no MCAP file, or is damaged.
     pub(super) fn next<T>(&mut self, take: impl FnOnce(Record<'_>) -> T) -> Result<Option<T>, String> {
-        while !self.is_over {
+        loop {
             if let Some(record) = self.chunk.next_record() {
                 return match record.and_then(|(opcode, data)| parsed(opcode, data)) {
                     Ok(record) => Ok(Some(take(record))),
                     Err(why) => Err(damaged(&self.path, &why)),
                 };
             }
-            let event = match self.reader.next_event() {
-                // A record that is longer than the file was cut with it.
-                None | Some(Err(McapError::UnexpectedEof | McapError::RecordTooLarge { .. })) => break,
-                Some(Err(McapError::BadMagic)) => return Err(format!("`{}` is no MCAP file", self.path.display())),
-                Some(Err(error)) => return Err(damaged(&self.path, &error)),
-                Some(Ok(event)) => event,
-            };
-            match event {
-                LinearReadEvent::ReadRequest(need) => {
-                    let read = self.file.read(self.reader.insert(need));
-                    let read = read.map_err(|error| format!("cannot read `{}`: {error}", self.path.display()))?;
-                    self.reader.notify_read(read);
+            if self.is_complete || self.is_cut {
+                return Ok(None);
+            }
+            match self.read()? {
+                None => self.is_cut = true,
+                Some(op::DATA_END) => self.is_complete = true,
+                Some(op::CHUNK) => {
+                    self.chunk.refill(&self.record, false).map_err(|why| damaged(&self.path, &why))?;
                 }
-                LinearReadEvent::Record { opcode: op::DATA_END, .. } => {
-                    self.is_complete = true;
-                    break;
+                Some(opcode) => {
+                    return match parsed(opcode, &self.record) {
+                        Ok(record) => Ok(Some(take(record))),
+                        Err(why) => Err(damaged(&self.path, &why)),
+                    };
                 }
-                LinearReadEvent::Record { opcode, data } => match parsed(opcode, data) {
-                    Ok(Record::Chunk { header, data }) => {
-                        self.chunk.refill(&header, &data).map_err(|why| damaged(&self.path, &why))?;
-                    }
-                    Ok(record) => return Ok(Some(take(record))),
-                    Err(why) => return Err(damaged(&self.path, &why)),
-                },
             }
         }
-        self.is_over = true;
-        Ok(None)
+    }
+
+    /// Reads the next record, and returns its sort; `None` where the file was cut. What is there of a chunk is kept.
+    fn read(&mut self) -> Result<Option<u8>, String> {
+        if !self.has_begun {
+            self.has_begun = true;
+            if self.take(MAGIC.len() as u64)? && self.record != MAGIC {
+                return Err(format!("`{}` is no MCAP file", self.path.display()));
+            }
+        }
+        if !self.take(1 + size_of::<u64>() as u64)? {
+            return Ok(None);
+        }
+        let Some((opcode, length)) = self.record.split_first() else { return Ok(None) };
+        let opcode = *opcode;
+        let length = length.try_into().map_or(0, u64::from_le_bytes);
+        let is_whole = self.take(length)?;
+        if !is_whole && opcode == op::CHUNK {
+            // One that was cut within its header has no record.
+            let _ = self.chunk.refill(&self.record, true);
+        }
+        Ok(Some(opcode).filter(|_| is_whole))
+    }
+
+    /// Reads so many bytes. Returns whether the file has them. It takes no more memory than the file has bytes.
+    fn take(&mut self, bytes: u64) -> Result<bool, String> {
+        self.record.clear();
+        let read = self.file.by_ref().take(bytes).read_to_end(&mut self.record);
+        let read = read.map_err(|error| format!("cannot read `{}`: {error}", self.path.display()))?;
+        Ok(read as u64 == bytes)
     }
 
     /// Whether the end of the data was found.
@@ -99,41 +110,56 @@ impl Records {
     }
 }
 
-/// The records of a chunk. The reader of the library trusts the lengths of its records.
+/// The records of a chunk.
 #[derive(Default)]
 struct Chunk {
     data: Vec<u8>,
     /// Where the next record begins.
     at: usize,
+    /// Whether the file was cut in it.
+    is_cut: bool,
 }
 
 impl Chunk {
-    /// Takes the next chunk, which must not be compressed.
-    fn refill(&mut self, header: &ChunkHeader, data: &[u8]) -> Result<(), String> {
-        if !header.compression.is_empty() {
-            return Err(format!("its compression `{}` is unknown", header.compression));
+    /// Takes the next chunk, which must not be compressed, or what is there of it.
+    fn refill(&mut self, record: &[u8], is_cut: bool) -> Result<(), String> {
+        (self.at, self.is_cut) = (0, is_cut);
+        self.data.clear();
+        let (crc, compression, data) = split(record).ok_or("a chunk ends within its header")?;
+        if !compression.is_empty() {
+            return Err(format!("its compression `{}` is unknown", String::from_utf8_lossy(compression)));
         }
-        if header.uncompressed_crc != 0 && crc32fast::hash(data) != header.uncompressed_crc {
+        if !is_cut && crc != 0 && crc32fast::hash(data) != crc {
             return Err("the checksum of a chunk is wrong".to_owned());
         }
-        self.data.clear();
         self.data.extend_from_slice(data);
-        self.at = 0;
         Ok(())
     }
 
     /// Returns the next record with its sort, or `None` after the last one.
     fn next_record(&mut self) -> Option<Result<(u8, &[u8]), String>> {
         let (opcode, rest) = self.data.get(self.at..)?.split_first()?;
-        let Some((length, rest)) = rest.split_first_chunk() else { return Some(Err(OUTSIDE.to_owned())) };
-        let length = usize::try_from(u64::from_le_bytes(*length)).ok().filter(|length| *length <= rest.len());
-        let Some(length) = length else { return Some(Err(OUTSIDE.to_owned())) };
-        self.at += 1 + size_of::<u64>() + length;
-        Some(Ok((*opcode, &rest[..length])))
+        let length = rest.split_first_chunk().map(|(length, rest)| (u64::from_le_bytes(*length), rest));
+        let Some((length, rest)) = length.filter(|(length, rest)| *length <= rest.len() as u64) else {
+            let outside = Err("a record ends outside of its chunk".to_owned());
+            return Some(outside).filter(|_| !self.is_cut);
+        };
+        self.at += 1 + size_of::<u64>() + length as usize;
+        Some(Ok((*opcode, &rest[..length as usize])))
     }
 }
 
-const OUTSIDE: &str = "a record ends outside of its chunk";
+/// Splits a chunk into its checksum, the name of its compression, and its data.
+fn split(record: &[u8]) -> Option<(u32, &[u8], &[u8])> {
+    // The times of its first and its last message, and its size without compression.
+    let rest = record.get(3 * size_of::<u64>()..)?;
+    let (crc, rest) = rest.split_first_chunk()?;
+    let (length, rest) = rest.split_first_chunk()?;
+    let (compression, rest) = rest.split_at_checked(u32::from_le_bytes(*length) as usize)?;
+    let (size, rest) = rest.split_first_chunk()?;
+    let size = usize::try_from(u64::from_le_bytes(*size)).ok()?.min(rest.len());
+    Some((u32::from_le_bytes(*crc), compression, &rest[..size]))
+}
 
 fn parsed(opcode: u8, data: &[u8]) -> Result<Record<'_>, String> {
     mcap::parse_record(opcode, data).map_err(|error| error.to_string())
