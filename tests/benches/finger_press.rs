@@ -39,8 +39,8 @@ impl Pair {
     /// With a graph whose commands are next to nothing: the bench repeats a tick with an arm that stands, and joints that
     /// do not follow are a fault. The tick computes the same as ever, with other numbers.
     pub(crate) fn resting() -> Self {
-        let gains = ["x", "y", "pressure", "orientation"].map(|feature| format!("nodes.pid.gains.{feature}.kp=1e-6"));
-        let others = ["nodes.pid.gains.pressure.ki=1e-6", "nodes.guide.twist=[0, 1e-6, 0, 0, 0, 0]"].map(String::from);
+        let gains = ["x", "y", "pressure", "orientation"].map(|feature| format!("nodes.pid.gains.{feature}.kp=1e-9"));
+        let others = ["nodes.pid.gains.pressure.ki=1e-9", "nodes.guide.twist=[0, 1e-9, 0, 0, 0, 0]"].map(String::from);
         let request = Request::file(workspace().join("graphs/finger_press.toml"));
         Self::of(gains.into_iter().chain(others).fold(request, Request::set))
     }
