@@ -316,7 +316,7 @@ fn the_section_record_selects_ports_and_a_replay_compares_those() {
     record_here(&with_section("").set("record.images=false"), &path, 50);
     let ports = names(&path);
     assert!(ports.len() > 60 && !ports.contains(&"pad.image".to_owned()), "{ports:?}");
-    assert_eq!(ticks_of_replay(&path), Ok(50), "the image is an input all the same");
+    assert_eq!(ticks_of_replay(&path), Ok(50), "the image is an input, whatever `[record]` says");
     assert!(fs::metadata(&path).unwrap().len() > large / 10);
 }
 

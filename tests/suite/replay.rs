@@ -1,4 +1,5 @@
-//! A recorded run comes again to the last bit, in another process and without its devices; another graph is told apart.
+//! A recorded run is repeated to the last bit, in another process and without its devices. A replay of another graph names
+//! the first difference.
 
 use std::fs;
 use std::path::{Path, PathBuf};
