@@ -115,8 +115,8 @@ impl ModeLaw<'_> {
         let port = feature.measured.as_deref()?;
         let node = self.nodes.writer(port)?;
         let frame = node.outputs.iter().find(|output| output.name == port)?.frames.first()?.as_deref()?;
-        let is_known =
-            ["moments", "principal_axes", "hough"].contains(&&*node.kind.text) && self.carried.contains(frame);
+        let is_known = ["moments", "principal_axes", "hough", "curvature"].contains(&&*node.kind.text)
+            && self.carried.contains(frame);
         is_known.then(|| port.rsplit('.').next())?
     }
 

@@ -2,7 +2,7 @@
 
 use std::f64::consts::PI;
 
-use nalgebra::{Matrix2, Matrix3, Vector2, Vector3};
+use nalgebra::{DMatrix, DVector, Matrix2, Vector2};
 use proptest::prelude::*;
 use tactflow_runtime::harness::{NodeRig, places};
 use tactflow_runtime::random::Random;
@@ -30,7 +30,8 @@ fn built(params: &str) -> Result<NodeRig, Mistakes> {
     NodeRig::new::<Curvature>(params, &wires)
 }
 
-/// Shows an image whose values are a function of the place [m]; the region is where they are at least 0.01.
+/// Shows an image whose values are a function of the place [m]; the region is where they are at least 0.01. Returns the
+/// turn, the length and the rate.
 fn show(rig: &mut NodeRig, value: &dyn Fn(f64, f64) -> f64) -> [Option<f64>; 3] {
     let shape = image_shape();
     let (mut image, mut region) = (Image::zeros(ROWS, COLS), Mask::empty(ROWS, COLS));
@@ -45,6 +46,11 @@ fn show(rig: &mut NodeRig, value: &dyn Fn(f64, f64) -> f64) -> [Option<f64>; 3] 
     rig.set("region", region);
     rig.step();
     ["turn", "length", "rate"].map(|output| rig.get::<Scalar>(output).copied())
+}
+
+/// Returns x, y and the direction that the last image has.
+fn place(rig: &NodeRig) -> [Option<f64>; 3] {
+    ["x", "y", "orientation"].map(|output| rig.get::<Scalar>(output).copied())
 }
 
 /// The print of a line n = c s² whose axis is at an angle to x: a bell across the line and a squared cosine along it,
@@ -85,6 +91,66 @@ fn an_arc_has_the_curvature_of_its_circle() {
         let expected = (1.0 + 0.054 * (0.064 / radius) * (0.064 / radius)) / radius;
         assert!((turn / length - expected).abs() < 0.05 / radius.abs(), "{radius}: {} of {expected}", turn / length);
     }
+}
+
+#[test]
+fn a_line_that_bends_is_where_it_is_and_not_at_its_centre_of_gravity() {
+    for degrees in [-80.0_f64, -45.0, -10.0, 0.0, 30.0, 60.0, 90.0] {
+        for curvature in [-12.0, 0.0, 10.0] {
+            let mut rig = built("").unwrap();
+            show(&mut rig, &line(0.5 * curvature, 0.07, degrees.to_radians()));
+            let [x, y, orientation] = place(&rig).map(Option::unwrap);
+            let turned = (orientation - degrees.to_radians()).sin().abs();
+            // The centre of gravity is 5 mm beside the bend of 12 1/m.
+            assert!(x.hypot(y) < 3e-4 && turned < 0.02, "{degrees}, {curvature}: {x}, {y}, {orientation}");
+        }
+    }
+}
+
+#[test]
+fn a_line_is_measured_abreast_of_the_middle_of_the_pad() {
+    // A parabola that is pressed more on one side, and one that ends before the middle.
+    let (curvature, lopsided) = (8.0, |x: f64| 1.0 + 20.0 * x);
+    let bend = |x: f64, y: f64| libm::exp(-0.5 * ((y - 0.5 * curvature * x * x) / 0.004).powi(2));
+    let mut rig = built("").unwrap();
+    show(&mut rig, &|x, y| if x.abs() < 0.035 { lopsided(x) * bend(x, y) } else { 0.0 });
+    let [x, y, orientation] = place(&rig).map(Option::unwrap);
+    assert!(x.abs() < 1e-4 && y.abs() < 2e-4 && orientation.abs() < 0.015, "{x}, {y}, {orientation}");
+    show(&mut rig, &|x, y| if (0.01..0.05).contains(&x) { bend(x, y) } else { 0.0 });
+    let [x, y, orientation] = place(&rig).map(Option::unwrap);
+    let (expected_y, expected_angle) = (0.5 * curvature * x * x, libm::atan(curvature * x));
+    assert!((x - 0.01).abs() < 3e-3, "{x}");
+    assert!((y - expected_y).abs() < 1e-3 && (orientation - expected_angle).abs() < 0.03, "{y}, {orientation}");
+}
+
+#[test]
+fn a_cubic_follows_a_bend_that_changes() {
+    // n = d s³ has no curvature in the middle, and a parabola through it is turned.
+    let value =
+        |x: f64, y: f64| if x.abs() < 0.03 { libm::exp(-0.5 * ((y - 150.0 * x * x * x) / 0.004).powi(2)) } else { 0.0 };
+    let turned = |degree: usize| {
+        let mut rig = built(&format!("degree = {degree}")).unwrap();
+        show(&mut rig, &value);
+        place(&rig)[2].unwrap()
+    };
+    // For a uniform bar of half the length h, the slope of the parabola is 3/5 d h².
+    assert!((turned(2) - 0.6 * 150.0 * 0.03 * 0.03).abs() < 0.01, "{}", turned(2));
+    assert!(turned(3).abs() < 0.01, "{}", turned(3));
+}
+
+#[test]
+fn a_contact_that_is_no_line_has_its_centre_of_gravity() {
+    let round = |x: f64, y: f64| libm::exp(-0.5 * ((x - 0.003).powi(2) + (y + 0.002).powi(2)) / 6.4e-5);
+    let mut rig = built("").unwrap();
+    show(&mut rig, &round);
+    let [x, y, orientation] = place(&rig);
+    assert!((x.unwrap() - 0.003).abs() < 1e-4 && (y.unwrap() + 0.002).abs() < 1e-4, "{x:?}, {y:?}");
+    assert_eq!(orientation, None);
+    let mut rig = built("min_length_m = 0.05").unwrap();
+    assert_eq!(show(&mut rig, &line(0.0, 0.04, 0.3))[0], None);
+    assert!((place(&rig)[2].unwrap() - 0.3).abs() < 0.01, "a short line has a direction");
+    show(&mut rig, &|_, _| 0.0);
+    assert_eq!(place(&rig), [None; 3], "nothing");
 }
 
 #[test]
@@ -144,8 +210,9 @@ fn wrong_parameters_are_refused() {
     }
 }
 
-/// The curvature of the weighted least-squares parabola in the axes of the covariance; `None` without a clear axis.
-fn least_squares(tactels: &[(f64, Vector2<f64>)]) -> Option<f64> {
+/// The curvature of the weighted least-squares polynomial in the axes of the covariance [1/m], and its point [m] and its
+/// tangent abreast of the middle of the pad; `None` without a clear axis.
+fn least_squares(tactels: &[(f64, Vector2<f64>)], degree: usize) -> Option<(f64, Vector2<f64>, Vector2<f64>)> {
     let sum: f64 = tactels.iter().map(|(weight, _)| weight).sum();
     let centre = tactels.iter().fold(Vector2::zeros(), |sum, (weight, at)| sum + at * *weight) / sum;
     let spread = tactels
@@ -155,22 +222,30 @@ fn least_squares(tactels: &[(f64, Vector2<f64>)]) -> Option<f64> {
     let eigen = spread.symmetric_eigen();
     let axis = eigen.eigenvectors.column(eigen.eigenvalues.imax()).into_owned();
     let axis = if axis.x < 0.0 { -axis } else { axis };
-    let (mut normal, mut right) = (Matrix3::zeros(), Vector3::zeros());
-    for (weight, at) in tactels {
-        let (s, n) = (axis.dot(&(at - centre)), axis.x * (at - centre).y - axis.y * (at - centre).x);
-        // In centimetres, which is better conditioned.
-        let row = Vector3::new(1.0, 100.0 * s, 1e4 * s * s);
-        normal += row * row.transpose() * *weight;
-        right += row * (100.0 * n * *weight);
-    }
-    let fit = normal.lu().solve(&right)?;
+    let across = Vector2::new(-axis.y, axis.x);
+    // In centimetres, which is better conditioned.
+    let powers = |s: f64| (0..=degree).map(move |k| (100.0 * s).powi(k as i32));
+    let rows = DMatrix::from_row_iterator(
+        tactels.len(),
+        degree + 1,
+        tactels.iter().flat_map(|(weight, at)| powers(axis.dot(&(at - centre))).map(|power| weight.sqrt() * power)),
+    );
+    let right = tactels.iter().map(|(weight, at)| weight.sqrt() * 100.0 * across.dot(&(at - centre)));
+    let p = rows.svd(true, true).solve(&DVector::from_iterator(tactels.len(), right), 1e-12).ok()?;
+    let length = (12.0 * eigen.eigenvalues.max()).sqrt();
+    let s = 100.0 * axis.dot(&-centre).clamp(-0.5 * length, 0.5 * length);
+    let falling = |j: usize, k: usize| ((j - k + 1)..=j).product::<usize>() as f64;
+    let derivative = |k: usize| -> f64 { (k..=degree).map(|j| p[j] * falling(j, k) * s.powi((j - k) as i32)).sum() };
+    let [n, slope, second] = [0, 1, 2].map(derivative);
     let is_clear = eigen.eigenvalues.max() > 1.2 * eigen.eigenvalues.min() && axis.x > 1e-3;
-    is_clear.then(|| 100.0 * 2.0 * fit[2] / (1.0 + fit[1] * fit[1]).powf(1.5))
+    let curvature = 100.0 * second / (1.0 + slope * slope).powf(1.5);
+    let point = centre + 0.01 * (axis * s + across * n);
+    is_clear.then(|| (curvature, point, (axis + across * slope).normalize()))
 }
 
 proptest! {
     #[test]
-    fn it_is_the_least_squares_parabola(seed in 0..10_000u64, threshold in 0.3..0.9f64) {
+    fn it_is_the_least_squares_curve(seed in 0..10_000u64, threshold in 0.3..0.9f64, degree in 2..=3_usize) {
         let mut random = Random::new(seed, 0);
         let cells: Vec<f64> = (0..ROWS * COLS).map(|_| random.uniform(0.0, 1.0)).collect();
         let (cut, tilt) = (random.uniform(0.02, 0.05), random.uniform(-0.5, 0.5));
@@ -185,10 +260,15 @@ proptest! {
         let tactels: Vec<_> =
             places.map(|(x, y)| (value(x, y), Vector2::new(x, y))).filter(|(weight, _)| *weight > 0.0).collect();
         prop_assume!(tactels.len() > 10);
-        let expected = least_squares(&tactels);
+        let expected = least_squares(&tactels, degree);
         prop_assume!(expected.is_some());
-        let shown = show(&mut built(ANY).unwrap(), &value);
-        let (found, expected) = (shown[0].unwrap() / shown[1].unwrap(), expected.unwrap());
+        let mut rig = built(&format!("{ANY}\ndegree = {degree}")).unwrap();
+        let shown = show(&mut rig, &value);
+        let (found, (expected, point, tangent)) = (shown[0].unwrap() / shown[1].unwrap(), expected.unwrap());
         prop_assert!((found - expected).abs() < 1e-6 * (1.0 + expected.abs()), "{} of {}", found, expected);
+        let [x, y, orientation] = place(&rig).map(Option::unwrap);
+        prop_assert!((Vector2::new(x, y) - point).norm() < 1e-9, "{} {} of {}", x, y, point);
+        let (sine, cosine) = libm::sincos(orientation);
+        prop_assert!((cosine * tangent.y - sine * tangent.x).abs() < 1e-7, "{} of {}", orientation, tangent);
     }
 }
