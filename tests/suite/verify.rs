@@ -63,6 +63,40 @@ fn what_is_missed_ends_with_1_and_is_printed_all_the_same() {
 }
 
 #[test]
+fn a_goal_that_is_missed_is_printed_with_its_reason_and_fails_nothing() {
+    let folder = tempfile::tempdir().unwrap();
+    let (file, tests) = (folder.path().join("goals.toml"), workspace().join("tests/scenarios"));
+    let text = |checks: &str| {
+        format!(
+            "[scenario]\ngraph = '{0}/tasks/slide.toml'\nbench = '{0}/benches/slide.toml'\nseeds = 2\nfor_s = 4.0\n\
+             from = 'touch.present'\n[check.x]\nof = 'error.error.x'\nunit = {{ tactel = 0.005 }}\n\
+             settles_to = 0.0\nwithin = 0.3\nsteady_s = 2.0\n{checks}",
+            tests.display()
+        )
+    };
+    let verified = |checks: &str, more: &[&str]| {
+        fs::write(&file, text(checks)).unwrap();
+        let Said { code, out, err } = say(&[&["verify", file.to_str().unwrap()], more].concat());
+        assert_eq!((code, err.as_str()), (0, ""), "{out}");
+        out
+    };
+    let out = verified("goal = { response_s = 0.4, error = 0.02 }\nmissed = 'The pad is slow.'", &[]);
+    let line = "  response of x misses its goal: 0.48000 s instead of 0.40000 s. The pad is slow.\n";
+    assert!(out.contains(line), "{out}");
+    assert_eq!(row(&out, "x", "response").last(), Some(&"passed (goal missed)"), "{out}");
+    assert!(out.ends_with("\n1 passed, 0 failed, 2 informational, 1 goal missed, in 2 runs\n"), "{out}");
+    let out = verified("goal = { response_s = 0.4 }", &[]);
+    assert!(out.contains("instead of 0.40000 s. no reason is given: add `missed` to the check\n"), "{out}");
+    let out = verified("goal = { response_s = 0.5 }\nmissed = 'The pad is slow.'", &[]);
+    assert!(out.contains("  x reaches its goals: remove `missed` from the check\n"), "{out}");
+    let out = verified("goal = { response_s = 0.4, error = 0.02 }", &["--json"]);
+    let rows = &serde_json::from_str::<serde_json::Value>(&out).unwrap()["scenarios"][0]["rows"];
+    let goals =
+        rows.as_array().unwrap().iter().map(|row| (row["goal"].as_f64(), row["misses_goal"].as_bool().unwrap()));
+    assert_eq!(goals.collect::<Vec<_>>(), [(Some(0.4), true), (Some(0.02), false), (None, false)]);
+}
+
+#[test]
 fn a_fault_is_a_row_and_the_others_run() {
     let Said { code, out, err } = say(&["verify", FAULT, NEVER, MOCK]);
     assert_eq!(code, 1);

@@ -1,6 +1,6 @@
 //! The figures of a check and of the run as a whole, with their bounds and the values from the paper.
 
-use super::check_table::{CheckTable, PaperTable};
+use super::check_table::{CheckTable, FigureValues};
 use super::document::ScenarioTable;
 use super::figure::{Bound, Figure};
 use super::judge::FigureRow;
@@ -33,15 +33,15 @@ pub(super) fn figures(table: &CheckTable) -> Vec<(Figure, Bound)> {
     figures
 }
 
-/// Returns the values that the paper gives.
-pub(super) fn papers(paper: &PaperTable) -> Vec<(Figure, f64)> {
+/// Returns the figures with a value to compare them with.
+pub(super) fn compared(values: &FigureValues) -> Vec<(Figure, f64)> {
     let values = [
-        (Figure::Response, paper.response_s),
-        (Figure::Error, number(&paper.error)),
-        (Figure::Mean, number(&paper.mean)),
-        (Figure::Std, number(&paper.std)),
-        (Figure::Max, number(&paper.max)),
-        (Figure::Min, number(&paper.min)),
+        (Figure::Response, values.response_s),
+        (Figure::Error, number(&values.error)),
+        (Figure::Mean, number(&values.mean)),
+        (Figure::Std, number(&values.std)),
+        (Figure::Max, number(&values.max)),
+        (Figure::Min, number(&values.min)),
     ];
     values.into_iter().filter_map(|(figure, value)| Some((figure, value?))).collect()
 }
@@ -54,5 +54,5 @@ pub(super) fn rows_of(table: &ScenarioTable) -> impl Iterator<Item = FigureRow> 
         (&table.ends_in, "ends_in", Figure::Ends, Bound::AtLeast(1.0)),
     ];
     let given = rows.into_iter().filter_map(|(word, key, figure, bound)| Some((word.as_ref()?, key, figure, bound)));
-    given.map(|(word, key, figure, bound)| row(key, &word.value, figure, "1", bound, None))
+    given.map(|(word, key, figure, bound)| row(key, &word.value, figure, "1", bound))
 }

@@ -58,12 +58,17 @@ pub(crate) struct CheckTable {
     pub(crate) unit: Option<Map<f64>>,
     /// Values from the paper to print beside the figures.
     #[param(unit = "$unit")]
-    pub(crate) paper: Option<PaperTable>,
+    pub(crate) paper: Option<FigureValues>,
+    /// Values that the task should reach. What it does not reach is printed, and is no failure.
+    #[param(unit = "$unit")]
+    pub(crate) goal: Option<FigureValues>,
+    /// Why the task does not reach its goal.
+    pub(crate) missed: Option<Spanned<String>>,
 }
 
-/// Values from the paper.
+/// Values to compare figures with.
 #[derive(Debug, Clone, Param)]
-pub(crate) struct PaperTable {
+pub(crate) struct FigureValues {
     /// Response time.
     #[param(unit = "s")]
     pub(crate) response_s: Option<f64>,
@@ -102,11 +107,10 @@ impl CheckTable {
             &mut self.never_above,
             &mut self.never_below,
         ];
-        let paper = self
-            .paper
-            .iter_mut()
-            .flat_map(|paper| [&mut paper.error, &mut paper.mean, &mut paper.std, &mut paper.max, &mut paper.min]);
-        bounds.into_iter().chain(paper).flatten()
+        let compared = [&mut self.paper, &mut self.goal].into_iter().flatten();
+        let compared =
+            compared.flat_map(|FigureValues { error, mean, std, max, min, .. }| [error, mean, std, max, min]);
+        bounds.into_iter().chain(compared).flatten()
     }
 }
 
@@ -133,6 +137,10 @@ impl CheckBlock {
             found.push(Diagnostic::new(code, self.span(key), message).help(help));
         };
         self.targets(table, &mut wrong);
+        if table.missed.is_some() && table.goal.is_none() {
+            let help = "add `goal`, such as `goal = { response_s = 0.7 }`";
+            wrong(Code::MissingKey, "missed", "`missed` needs `goal`".into(), help);
+        }
         if let (Some(after), Some(for_s)) = (table.after_s, for_s)
             && after >= for_s
         {

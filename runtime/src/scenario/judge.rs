@@ -35,6 +35,10 @@ pub struct FigureRow {
     pub bound: Bound,
     /// The value from the paper, if it reports one.
     pub paper: Option<f64>,
+    /// The value that the task should reach, if there is one.
+    pub goal: Option<f64>,
+    /// Why it does not reach its goal.
+    pub missed: Option<String>,
     /// The figure of each run, in the order of the seeds; `None` if it could not be measured.
     pub values: Vec<Option<f64>>,
     /// Number of runs without a tick to check, for example because the mode of `during` was never reached.
@@ -87,6 +91,20 @@ impl FigureRow {
         Some((good.min(bad), good.max(bad)))
     }
 
+    /// Returns the value to compare with the goal: the median, or the worst of all runs for a maximum or a minimum.
+    #[must_use]
+    pub fn reached(&self) -> Option<f64> {
+        if matches!(self.figure, Figure::Max | Figure::Min) { self.worst() } else { self.median() }
+    }
+
+    /// Returns the goal that the figure does not reach.
+    #[must_use]
+    pub fn missed_goal(&self) -> Option<f64> {
+        let goal = self.goal?;
+        let is_reached = |value: f64| if self.figure.is_better_high() { value >= goal } else { value <= goal };
+        (!self.reached().is_some_and(is_reached)).then_some(goal)
+    }
+
     /// Compares the figure with its bound. A run without a tick to check fails, even if the figure has no bound.
     #[must_use]
     pub fn verdict(&self) -> Verdict {
@@ -135,7 +153,8 @@ mod tests {
     fn row(figure: Figure, bound: Bound, values: &[f64]) -> FigureRow {
         let values = values.iter().map(|value| Some(*value).filter(|value| !value.is_nan())).collect();
         let (check, of, unit) = ("x".into(), "a.b".into(), "m".into());
-        FigureRow { check, of, during: None, until: None, figure, unit, bound, paper: None, values, not_checked: 0 }
+        let (during, until, paper, goal, missed) = (None, None, None, None, None);
+        FigureRow { check, of, during, until, figure, unit, bound, paper, goal, missed, values, not_checked: 0 }
     }
 
     #[test]
@@ -211,6 +230,21 @@ mod tests {
             let empty = FigureRow { not_checked: 1, ..row(figure, bound, values) };
             assert_eq!(empty.verdict(), Failed, "{figure:?} {bound:?} in a run without a tick to check");
         }
+    }
+
+    #[test]
+    fn a_goal_is_compared_with_the_median_and_that_of_an_extreme_with_the_worst_run() {
+        let missed = |figure: Figure, values: &[f64], goal: f64| {
+            let row = FigureRow { goal: Some(goal), ..row(figure, Bound::None, values) };
+            row.missed_goal()
+        };
+        assert_eq!(missed(Figure::Std, &[1.0, 2.0, 9.0], 2.0), None);
+        assert_eq!(missed(Figure::Std, &[1.0, 2.0, 9.0], 1.9), Some(1.9));
+        assert_eq!(missed(Figure::Response, &[0.5, f64::NAN, f64::NAN], 1.0), Some(1.0));
+        assert_eq!(missed(Figure::Max, &[1.0, 2.0], 1.5), Some(1.5));
+        assert_eq!(missed(Figure::Min, &[1.0, 2.0], 0.9), None);
+        assert_eq!(missed(Figure::Min, &[1.0, 2.0], 1.1), Some(1.1));
+        assert_eq!(row(Figure::Std, Bound::None, &[1.0]).missed_goal(), None, "without a goal");
     }
 
     #[test]

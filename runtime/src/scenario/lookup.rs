@@ -2,7 +2,7 @@
 
 use std::collections::BTreeSet;
 
-use super::bounds::{figures, number, papers, rows_of};
+use super::bounds::{compared, figures, number, rows_of};
 use super::check_table::{CheckBlock, CheckTable};
 use super::document::{Document, ScenarioTable};
 use super::figure::{Bound, Figure};
@@ -132,8 +132,10 @@ impl Lookup<'_> {
         let (column, _) = self.column(&block.table.as_ref()?.of)?;
         let table = &self.in_unit(block, &column)?;
         let figures = figures(table);
-        let papers = table.paper.as_ref().map(papers).unwrap_or_default();
-        self.uncomputed(block, &papers, &figures);
+        let [papers, goals] =
+            [&table.paper, &table.goal].map(|values| values.as_ref().map(compared).unwrap_or_default());
+        self.uncomputed(block, ("paper", "the paper's value"), &papers, &figures);
+        self.uncomputed(block, ("goal", "the goal"), &goals, &figures);
         let minus = match &table.minus {
             Some(word) => Some(self.subtrahend(word, &column)?),
             None => None,
@@ -143,10 +145,11 @@ impl Lookup<'_> {
             None => (column.unit.to_string(), 1.0),
         };
         let rows = figures.iter().map(|(figure, bound)| {
-            let paper = papers.iter().find(|(of, _)| of == figure).map(|(_, value)| *value);
-            let row = row(&block.key.name, &table.of.value, *figure, &unit_name, *bound, paper);
-            let name = |word: &Option<Spanned<String>>| word.as_ref().map(|word| word.value.clone());
-            FigureRow { during: name(&table.during), until: name(&table.until), ..row }
+            let of = |values: &[(Figure, f64)]| values.iter().find(|(of, _)| of == figure).map(|(_, value)| *value);
+            let row = row(&block.key.name, &table.of.value, *figure, &unit_name, *bound);
+            let word = |word: &Option<Spanned<String>>| word.as_ref().map(|word| word.value.clone());
+            let (during, until, missed) = (word(&table.during), word(&table.until), word(&table.missed));
+            FigureRow { during, until, paper: of(&papers), goal: of(&goals), missed, ..row }
         });
         let check = Check {
             name: block.key.name.clone(),
@@ -164,13 +167,18 @@ impl Lookup<'_> {
         Some((check, rows.collect()))
     }
 
-    /// Reports each value of the paper whose figure the check does not compute.
-    fn uncomputed(&mut self, block: &CheckBlock, papers: &[(Figure, f64)], figures: &[(Figure, Bound)]) {
-        for (paper, _) in papers.iter().filter(|(paper, _)| !figures.iter().any(|(figure, _)| figure == paper)) {
-            let message =
-                format!("the check computes no `{}`, so the paper's value has nothing to compare with", paper.name());
+    /// Reports each value whose figure the check does not compute. It is given by its key and by a name for messages.
+    fn uncomputed(
+        &mut self,
+        block: &CheckBlock,
+        (key, what): (&str, &str),
+        values: &[(Figure, f64)],
+        figures: &[(Figure, Bound)],
+    ) {
+        for (value, _) in values.iter().filter(|(value, _)| !figures.iter().any(|(figure, _)| figure == value)) {
+            let message = format!("the check computes no `{}`, so {what} has nothing to compare with", value.name());
             let help = format!("the check computes {}", quoted(figures.iter().map(|(figure, _)| figure.name())));
-            self.found.push(Diagnostic::new(Code::UnknownKey, block.span("paper"), message).help(help));
+            self.found.push(Diagnostic::new(Code::UnknownKey, block.span(key), message).help(help));
         }
     }
 

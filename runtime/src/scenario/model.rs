@@ -92,7 +92,7 @@ impl Scenario {
 }
 
 /// Creates a row without values.
-pub(super) fn row(check: &str, of: &str, figure: Figure, unit: &str, bound: Bound, paper: Option<f64>) -> FigureRow {
+pub(super) fn row(check: &str, of: &str, figure: Figure, unit: &str, bound: Bound) -> FigureRow {
     let unit = if figure.is_time() { "s" } else { unit };
     FigureRow {
         check: check.into(),
@@ -102,7 +102,9 @@ pub(super) fn row(check: &str, of: &str, figure: Figure, unit: &str, bound: Boun
         figure,
         unit: unit.into(),
         bound,
-        paper,
+        paper: None,
+        goal: None,
+        missed: None,
         values: Vec::new(),
         not_checked: 0,
     }

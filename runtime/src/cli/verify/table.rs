@@ -44,6 +44,8 @@ pub(crate) fn notes(all: &[Verified]) -> String {
         if let Ok(scenario) = &verified.loaded {
             text.push_str(&format!("{}: {}\n", verified.name(), describe(scenario)));
             text.extend(verified.rows.iter().filter_map(|row| worst_of(row, &verified.trials)));
+            text.extend(verified.rows.iter().filter_map(missed_goal));
+            text.extend(needless_reasons(&verified.rows));
         }
     }
     text
@@ -58,6 +60,8 @@ pub(crate) fn summary(all: &[Verified]) -> String {
     let unloaded = all.iter().filter(|verified| verified.loaded.is_err()).count();
     let mut parts = vec![format!("{} passed", count(Verdict::Passed)), format!("{} failed", count(Verdict::Failed))];
     parts.push(format!("{} informational", count(Verdict::Informational)));
+    let missed = all.iter().flat_map(|verified| &verified.rows).filter(|row| row.missed_goal().is_some()).count();
+    parts.extend((missed > 0).then(|| format!("{} missed", count_of(missed, "goal"))));
     let ended = if failed == 0 { String::new() } else { format!(" ({failed} ended in an error)") };
     parts.push(format!("in {}{ended}", count_of(runs, "run")));
     parts.extend((unloaded > 0).then(|| format!("{} not loaded", count_of(unloaded, "scenario"))));
@@ -82,6 +86,25 @@ fn worst_of(row: &FigureRow, trials: &[Trial]) -> Option<String> {
     let trial = trials.iter().zip(&row.values).find(|(_, value)| **value == Some(worst)).map(|(trial, _)| trial)?;
     let seed = trial.seed.filter(|_| row.verdict() == Verdict::Failed && !trial.varied.is_empty())?;
     Some(format!("  {} of {} is worst with seed {seed}: {}\n", row.figure.name(), row.check, sets(&trial.varied)))
+}
+
+/// Writes a goal that a figure misses, with the reason that the file gives.
+fn missed_goal(row: &FigureRow) -> Option<String> {
+    let (goal, reached) = (number(row.missed_goal()?), row.reached().map_or_else(|| "-".to_owned(), number));
+    let why = row.missed.as_deref().unwrap_or("no reason is given: add `missed` to the check");
+    let (figure, check, unit) = (row.figure.name(), &row.check, &row.unit);
+    Some(format!("  {figure} of {check} misses its goal: {reached} {unit} instead of {goal} {unit}. {why}\n"))
+}
+
+/// Names the checks that give a reason although they reach all of their goals.
+fn needless_reasons(rows: &[FigureRow]) -> Vec<String> {
+    let checks: BTreeMap<&str, bool> =
+        rows.iter().filter(|row| row.missed.is_some()).fold(BTreeMap::new(), |mut all, row| {
+            *all.entry(row.check.as_str()).or_default() |= row.missed_goal().is_some();
+            all
+        });
+    let reached = checks.into_iter().filter(|(_, is_missed)| !is_missed);
+    reached.map(|(check, _)| format!("  {check} reaches its goals: remove `missed` from the check\n")).collect()
 }
 
 /// Writes the parameters that vary as arguments of `run`.
@@ -127,7 +150,7 @@ fn cells(row: &FigureRow, has_colour: bool) -> [String; 10] {
         row.paper.map_or_else(String::new, number),
         format!("{}{missing}", figure(row.worst())),
         interval,
-        mark(row.verdict(), has_colour),
+        mark(row.verdict(), has_colour) + if row.missed_goal().is_some() { " (goal missed)" } else { "" },
     ]
 }
 
@@ -203,6 +226,9 @@ struct RowJson<'a> {
     /// What the bound applies to; null without a bound.
     judged: Option<Judged>,
     paper: Option<f64>,
+    goal: Option<f64>,
+    /// Whether the figure misses its goal.
+    misses_goal: bool,
     /// `informational` without a bound.
     mark: Verdict,
     /// In the order of the runs.
@@ -256,6 +282,8 @@ fn row_json(row: &FigureRow) -> RowJson<'_> {
         target,
         judged,
         paper: row.paper,
+        goal: row.goal,
+        misses_goal: row.missed_goal().is_some(),
         mark: row.verdict(),
         values: &row.values,
     }
