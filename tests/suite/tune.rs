@@ -48,6 +48,29 @@ fn a_slow_edge_gets_the_gain_that_was_found_by_hand_and_the_files_keep_their_com
 }
 
 #[test]
+fn a_loop_is_measured_with_several_settings_and_the_worst_of_them_decides() {
+    let (_folder, path) = in_new_folder("force.toml");
+    fs::write(&path, shipped("force.toml")).unwrap();
+    let bench = Path::new(&path).with_file_name("pen.toml").display().to_string();
+    fs::write(&bench, shipped("benches/pen.toml")).unwrap();
+    let softer = "devices.bench.stiffness=100.0";
+    let said = say(&["tune", &path, "--bench", &bench, "--also", softer, "--save", "--format", "json"]);
+    assert_eq!(said.code, 0, "{}{}", said.out, said.err);
+    let mut printed = serde_json::Deserializer::from_str(&said.out).into_iter::<Value>();
+    let found = printed.next().unwrap().unwrap();
+    let contacts = found["contacts"].as_array().unwrap();
+    let objects: Vec<&str> = contacts.iter().map(|contact| contact["object"].as_str().unwrap()).collect();
+    assert_eq!(objects, ["pen".to_owned(), format!("pen with {softer}")]);
+    let [arm, soft] = [0, 1].map(|i| contacts[i]["pressure"]["vz"].as_f64().unwrap());
+    assert!(soft < 0.8 * arm, "an arm of half the stiffness yields: {arm}, {soft}");
+    let margins = found["features"][0]["margins"].as_array().unwrap();
+    let worst = margins.iter().map(|margins| margins["peak_sensitivity"].as_f64().unwrap()).fold(0.0, f64::max);
+    assert!(margins.len() == 2 && (1.2..=1.7).contains(&worst), "{margins:?}");
+    let saved: toml::Table = toml::from_str(&fs::read_to_string(&bench).unwrap()).unwrap();
+    assert_eq!(saved["facts"]["arm"]["contacts"].as_array().unwrap().len(), 2, "each setting has its contact");
+}
+
+#[test]
 fn a_picture_that_cannot_be_written_is_found_before_the_robot_moves() {
     let (_folder, page) = in_new_folder("page.html");
     fs::write(&page, "<html><svg></svg></html>").unwrap();

@@ -40,6 +40,7 @@ proposes the largest gains that keep the margins over all contacts. Then it runs
 Examples:
   tactflow tune graphs/hybrid.toml
   tactflow tune graphs/hybrid.toml --feature pressure --with graphs/benches/pen.toml --with graphs/benches/toy_box.toml
+  tactflow tune graphs/force.toml --also nodes.error.setpoint.pressure=0.05  at another setpoint too
   tactflow tune graphs/edge.toml --svg bode.svg  draw the loops as a Bode plot
   tactflow tune graphs/force.toml --save        write the gains into the graph, and the contacts into the benches
 
@@ -54,6 +55,9 @@ pub(super) struct TuneArgs {
     /// Measure on this bench too, for an object of another stiffness; may be repeated
     #[arg(long = "with", value_name = "FILE")]
     others: Vec<PathBuf>,
+    /// Measure with this setting too, on each bench, for example with another setpoint; may be repeated
+    #[arg(long = "also", value_name = "KEY=VALUE")]
+    also: Vec<String>,
     /// The mode that is tuned; the one with the most features if not given
     #[arg(long)]
     mode: Option<String>,
@@ -193,15 +197,16 @@ fn tune(args: &TuneArgs, shell: &Shell, request: &Request, outline: &Outline) ->
     let (mode, controlled) = controlled(args, &index, &twist)?;
     let adder = adder(&index, &twist)?;
     let wanted = Wanted { peak: args.peak, gain_db: args.gain_margin, phase_deg: args.phase_margin };
-    let benches: Vec<Option<PathBuf>> = [None].into_iter().chain(args.others.iter().cloned().map(Some)).collect();
+    let cases = cases(args);
     let (mut contacts, mut files) = (Vec::new(), Vec::new());
     let mut answers: Vec<Vec<Found>> = controlled.iter().map(|_| Vec::new()).collect();
-    for bench in &benches {
-        let (request, file) = on_bench(request, bench.as_ref(), shell)?;
-        let object = file.as_ref().and_then(|file| file.file_stem()).map(|stem| stem.to_string_lossy().into_owned());
+    for case in &cases {
+        let (request, file) = on_bench(request, case, shell)?;
+        let stem = file.as_ref().and_then(|file| file.file_stem()).map(|stem| stem.to_string_lossy().into_owned());
+        let object =
+            stem.unwrap_or_else(|| "object".into()) + &case.also.map_or_else(String::new, |set| format!(" with {set}"));
         files.push(file);
-        let mut contact =
-            Contact { object: object.unwrap_or_else(|| "object".into()), latency_ms: 0.0, features: BTreeMap::new() };
+        let mut contact = Contact { object, latency_ms: 0.0, features: BTreeMap::new() };
         for (feature, answers) in controlled.iter().zip(&mut answers) {
             let experiment = Experiment {
                 catalogue: shell.catalogue(),
@@ -229,8 +234,8 @@ fn tune(args: &TuneArgs, shell: &Shell, request: &Request, outline: &Outline) ->
         .collect();
     let arm = command.trim_end_matches(".velocity").to_owned();
     let mut tuned = Tuned { mode: mode.name.clone(), arm, wanted, contacts, files, features, settled: Vec::new() };
-    for (bench, contact) in benches.iter().zip(&tuned.contacts) {
-        let (mut request, _) = on_bench(request, bench.as_ref(), shell)?;
+    for (case, contact) in cases.iter().zip(&tuned.contacts) {
+        let (mut request, _) = on_bench(request, case, shell)?;
         request.set.extend(lift::settings(outline, mode, &adder, experiment::measured(outline.period_s)));
         tuned.settled.extend(trial::compare(shell.catalogue(), &request, mode, &tuned.features, &contact.object)?);
     }
@@ -280,9 +285,26 @@ fn adder(index: &Index<'_>, twist: &str) -> Result<String, String> {
         .ok_or_else(|| format!("the motion `{twist}` comes from no `twist_adder`; {help}\"{twist}\""))
 }
 
-/// Returns the request for another bench with its file, and lets simulated devices run long enough.
-fn on_bench(request: &Request, bench: Option<&PathBuf>, shell: &Shell) -> Result<(Request, Option<PathBuf>), String> {
-    let mut request = Request { bench: bench.cloned().or_else(|| request.bench.clone()), ..request.clone() };
+/// What is measured: a bench, and a setting.
+#[derive(Clone, Copy)]
+struct Case<'a> {
+    /// The bench; that of the graph if it is `None`.
+    bench: Option<&'a PathBuf>,
+    /// A change of the graph or of the bench.
+    also: Option<&'a str>,
+}
+
+/// Returns what is measured: each bench as it is, and with each of the settings.
+fn cases(args: &TuneArgs) -> Vec<Case<'_>> {
+    let benches = [None].into_iter().chain(args.others.iter().map(Some));
+    let settings = || [None].into_iter().chain(args.also.iter().map(|also| Some(also.as_str())));
+    benches.flat_map(|bench| settings().map(move |also| Case { bench, also })).collect()
+}
+
+/// Returns the request for a case with the file of its bench, and lets simulated devices run long enough.
+fn on_bench(request: &Request, case: &Case<'_>, shell: &Shell) -> Result<(Request, Option<PathBuf>), String> {
+    let mut request = Request { bench: case.bench.cloned().or_else(|| request.bench.clone()), ..request.clone() };
+    request.set.extend(case.also.map(str::to_owned));
     let compiled = compile(shell.catalogue(), &request).map_err(|report| report.render(false))?;
     request.set.extend(experiment::long_enough(compiled.outline(), experiment::duration(compiled.outline().period_s)));
     Ok((request, bench_file(compiled.outline())))

@@ -28,15 +28,19 @@ pub(super) fn save(args: &TuneArgs, outline: &Outline, tuned: &Tuned, shell: &Sh
         }
     }
     let mut files = vec![graph];
-    for (bench, contact) in tuned.files.iter().zip(&tuned.contacts) {
-        let Some(bench) = bench else { continue };
+    // A bench that was measured with several settings has a contact for each.
+    let measured =
+        tuned.files.iter().zip(&tuned.contacts).filter_map(|(file, contact)| Some((file.as_ref()?, contact)));
+    let measured: Vec<_> = measured.collect();
+    for same in measured.chunk_by(|(one, _), (other, _)| one == other) {
+        let Some((bench, _)) = same.first() else { continue };
         // A graph can have its own devices.
-        let is_graph = *bench == args.graph;
+        let is_graph = **bench == args.graph;
         if !is_graph {
             files.push(BenchFile::read(bench)?);
         }
         let Some(file) = (if is_graph { files.first_mut() } else { files.last_mut() }) else { continue };
-        file.set(&["facts", &tuned.arm], "contacts", Array::from_iter([value(contact)]))?;
+        file.set(&["facts", &tuned.arm], "contacts", Array::from_iter(same.iter().map(|(_, contact)| value(contact))))?;
         if !is_graph {
             file.check(shell.catalogue())?;
         }
