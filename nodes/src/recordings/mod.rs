@@ -21,8 +21,8 @@ mod zebris;
 mod testing;
 
 pub use common::{
-    Assumed, FileFormat, FileHead, Frame, HEAD_BYTES, Hints, MAX_CELLS, Parser, Recording, Refusal, TextError, Window,
-    text,
+    Assumed, FileFormat, FileHead, Frame, HEAD_BYTES, Hints, MAX_CELLS, Parser, Recording, Refusal, TIME_UNITS,
+    TextError, Window, text,
 };
 pub use formats::{FORMATS, list, recognise};
 pub use read::read;

@@ -35,6 +35,8 @@ mod table;
 mod writer;
 
 pub use about::RunAbout;
+#[cfg(feature = "cli")]
+pub(crate) use about::about_run;
 pub use compare::{Differences, PortDifference};
 pub use diff::{RecordingDiff, diff};
 pub use export::{Exported, export};
@@ -42,3 +44,5 @@ pub use reader::{RecordedChannel, RecordedTick, Recording};
 pub use recorder::{RecordRequest, RunRecorded, RunRecorder};
 pub use recover::{Recovered, recover};
 pub use replay::{Replay, ReplayChanges, ReplayError, ReplayedTick, is_own_channel};
+#[cfg(feature = "cli")]
+pub(crate) use table::rows;
