@@ -33,7 +33,7 @@ pub struct Params {
     /// Numbers of rows and columns, if the file does not state them.
     #[param(range = 1..=1_000_000)]
     size: Option<[usize; 2]>,
-    /// Name of the pad to play, if the file has several.
+    /// Name of the pad to play, if the file has several; in a recording of a whole run, the role of the pad.
     pad: Option<String>,
     /// Unit of the times of a `csv` file whose column does not name it: `s`, `ms`, `us` or `ns`.
     time_unit: Option<TimeUnit>,
@@ -60,6 +60,7 @@ pub struct Params {
 /// - `xsensor`: `.csv` of XSENSOR
 /// - `csv`: plain tables with one frame per row or one frame per block
 /// - `npy`, `npz`: arrays of numpy, frames x rows x columns
+/// - `mcap`: a recording of a whole run, as `run --record` writes it; another graph then runs on the pad of that run
 ///
 /// Any of them may be in a `.zip` or `.gz`. Pressures are converted to kPa, and forces to N.
 ///
@@ -143,6 +144,7 @@ fn hints(params: &Params) -> Result<Hints, Mistakes> {
         rate_hz: params.rate_hz,
         size: params.size,
         pad: params.pad.clone(),
+        force: None,
         time_unit: params.time_unit.map(TimeUnit::seconds),
     })
 }

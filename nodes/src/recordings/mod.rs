@@ -9,6 +9,8 @@ mod common;
 mod csv;
 mod footscan;
 mod formats;
+#[cfg(feature = "mcap")]
+mod mcap;
 mod novel_asc;
 mod novel_lst;
 mod npy;

@@ -27,5 +27,9 @@ fn read_plain(bytes: &[u8], name: &str, hints: &Hints) -> Result<Recording, Refu
         let message = format!("only a `csv` file can have times without a unit, and this one is `{}`", format.name);
         return Err(Refusal::Contradicted { hint: "time_unit", message });
     }
+    if hints.force.is_some() && format.name != "mcap" {
+        let message = format!("only a recording of a whole run has ports, and this file is `{}`", format.name);
+        return Err(Refusal::Contradicted { hint: "force", message });
+    }
     format.read(bytes, hints)
 }

@@ -5,7 +5,10 @@ use std::path::Path;
 use serde_json::{Map, Value};
 
 use super::RecordFormat;
-use crate::source::suggestion;
+use crate::source::{quoted, suggestion};
+
+/// Maximum number of columns that a message lists.
+const MAX_LISTED: usize = 20;
 
 /// The names of the modes of a task, and the name of the task; that of the graph itself is empty.
 pub type TaskModes = (String, Vec<String>);
@@ -62,8 +65,14 @@ impl RunRows {
         let is_own = |column: &&RunColumn| column.name == name;
         let found: Vec<&RunColumn> = self.columns.iter().filter(|column| is_own(column) || part(column)).collect();
         if found.is_empty() {
-            let names = self.columns.iter().map(|column| column.name.as_str());
-            return Err(format!("the file has no column `{name}`: {}", suggestion(name, names, "columns")));
+            let names = || self.columns.iter().map(|column| column.name.as_str());
+            let mut near = suggestion(name, names(), "columns");
+            if !near.starts_with("did you mean") && names().count() > MAX_LISTED {
+                let mut nodes: Vec<&str> = names().map(|name| name.split('.').next().unwrap_or(name)).collect();
+                nodes.dedup();
+                near = format!("its {} columns are of {}", names().count(), quoted(nodes));
+            }
+            return Err(format!("the file has no column `{name}`: {near}"));
         }
         Ok(found)
     }

@@ -21,6 +21,8 @@ pub struct Hints {
     pub assumed: Option<Assumed>,
     /// Name of the pad, where a file has several.
     pub pad: Option<String>,
+    /// Name of the port that is the reference force, in a recording of a whole run.
+    pub force: Option<String>,
     /// Unit of the times of a file that does not name it [s].
     pub time_unit: Option<f64>,
 }

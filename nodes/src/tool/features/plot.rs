@@ -33,6 +33,10 @@ pub(super) fn draw(title: &str, table: &Path) -> Result<String, String> {
         ways.push(x.into_iter().zip(y).map(<[f64; 2]>::from).collect::<Vec<[f64; 2]>>());
         forces.push(column(node, "force")?);
     }
+    // Without a contact, noise moves the centre of the whole pad.
+    let [whole, contact] = &mut ways[..] else { return Err("two ways are drawn".into()) };
+    let untouched = whole.iter_mut().zip(&*contact).filter(|(_, contact)| contact[0].is_nan());
+    untouched.for_each(|(point, _)| *point = [f64::NAN; 2]);
     let flat: Vec<[f64; 2]> = ways.iter().flatten().copied().collect();
     let names: Vec<(usize, &str)> = SOURCES.iter().enumerate().map(|(i, (_, name))| (i, *name)).collect();
     let Some([x, y]) = axes(&flat) else {
@@ -50,7 +54,11 @@ pub(super) fn draw(title: &str, table: &Path) -> Result<String, String> {
     let last = bottom + GAP + LINE + HEIGHTS[1];
     let mut svg = Svg::new([WIDTH, last + GAP], title);
     legend(&mut svg, &names, ACROSS, 4.0);
-    svg.text([ACROSS[0], 4.0 + LINE + 12.5], "start", "centre of pressure; circle: first, square: last");
+    svg.text(
+        [ACROSS[0], 4.0 + LINE + 12.5],
+        "start",
+        "centre of pressure while there is a contact; circle: first, square: last",
+    );
     let (x, y) = (PlotAxis::linear(x[0], x[1], x_axis), PlotAxis::linear(y[0], y[1], y_axis));
     svg.axes(x, y, [Some("x [mm]"), Some("y [mm]")]);
     for (i, way) in ways.iter().enumerate() {

@@ -9,7 +9,7 @@ const WIDTH: f64 = 760.0;
 /// Left and right end of the curves [px].
 const ACROSS: [f64; 2] = [84.0, 740.0];
 /// Height of a panel [px].
-const PANEL_HEIGHT: f64 = 190.0;
+const PANEL_HEIGHT: f64 = 204.0;
 /// Space between two panels, and below the last one [px].
 const GAPS: [f64; 2] = [14.0, 56.0];
 
@@ -20,8 +20,9 @@ pub(super) fn draw(title: &str, rows: &RunRows, columns: &[&RunColumn], [from, t
     let ends = [shown.first(), shown.last()].map(|i| i.map_or(0.0, |i| rows.times[*i]));
     let time = PlotAxis::linear(ends[0], if ends[1] > ends[0] { ends[1] } else { ends[0] + 1.0 }, ACROSS);
     let panels = panels(columns);
-    let names =
-        |panel: &Vec<usize>| -> Vec<(usize, &str)> { panel.iter().map(|i| (*i, columns[*i].name.as_str())).collect() };
+    let names = |panel: &Vec<usize>| -> Vec<(usize, &str)> {
+        panel.iter().enumerate().map(|(number, i)| (number, columns[*i].name.as_str())).collect()
+    };
     let modes = modes(rows, &shown);
     let has_modes = if modes.is_empty() { 0.0 } else { LINE };
     let rows_of = |panel: &Vec<usize>| LINE * legend_rows(&names(panel), ACROSS) as f64;
@@ -44,9 +45,9 @@ pub(super) fn draw(title: &str, rows: &RunRows, columns: &[&RunColumn], [from, t
         };
         let y = PlotAxis::linear(low, high, [bottom, top]);
         svg.axes(time, y, [is_last, Some(&format!("[{unit}]"))]);
-        for i in panel {
+        for (number, i) in panel.iter().enumerate() {
             let points: Vec<[f64; 2]> = shown.iter().map(|row| [rows.times[*row], columns[*i].values[*row]]).collect();
-            curve(&mut svg, *i, &points, [time, y]);
+            curve(&mut svg, number, &points, [time, y]);
         }
     }
     svg.finish()

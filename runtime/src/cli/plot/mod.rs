@@ -21,14 +21,14 @@ Examples:
   tactflow run graphs/hybrid.toml --record run.mcap
   tactflow plot run.mcap touch.moments.x touch.moments.y touch.pressure.value --out contact.svg
   tactflow run graphs/hybrid.toml --out run.csv
-  tactflow plot run.csv arm.twist --from 2s --for 1s --out twist.svg
+  tactflow plot run.csv pid.control --from 2s --for 1s --out control.svg
 
 Exit codes: 0 success; 2 a file cannot be read, or has no such port."
 )]
 pub(super) struct PlotArgs {
     /// The run: a .mcap file of `--record`, or a .csv or .ndjson file of `--out`
     run: PathBuf,
-    /// Ports, or columns of ports: all components of a vector, or one, as `arm.twist.vx`
+    /// Ports, or columns of ports: all components of a vector, or one, as `pid.control.x`
     #[arg(required = true, value_name = "PORT")]
     ports: Vec<String>,
     /// Write the figure to an .svg file

@@ -126,9 +126,11 @@ pub fn bands(svg: &mut Svg, bands: &[FigureBand], x: PlotAxis, [top, bottom]: [f
                 format!("<path d=\"M{left:.1} {top:.1}V{bottom:.1}\" stroke=\"{INK}\" stroke-dasharray=\"2 3\"/>");
             svg.put(line);
         }
-        if left + 3.0 >= end {
-            svg.text([left + 3.0, top - 5.0], "start", &band.name);
-            end = left + 3.0 + CHARACTER * (band.name.chars().count() + 1) as f64;
+        let from = end.max(left + 3.0);
+        let to = from + CHARACTER * band.name.chars().count() as f64;
+        if to <= right || from == left + 3.0 {
+            svg.text([from, top - 5.0], "start", &band.name);
+            end = to + CHARACTER;
         }
     }
 }
