@@ -258,6 +258,12 @@ impl Recording {
         if recording.contents.about == RunAbout::default() {
             return Err(format!("`{}` is no recording of tactflow, or was cut at its start", path.display()));
         }
+        if recording.tick.is_none() && !recording.records.is_complete() {
+            let name = path.display();
+            return Err(format!(
+                "`{name}` was cut before its first tick: it has files of the graph, but nothing of the run"
+            ));
+        }
         Ok(recording)
     }
 

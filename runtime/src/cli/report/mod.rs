@@ -41,6 +41,11 @@ fn is_recording(file: &Path) -> bool {
     file.extension().is_some_and(|end| end == "mcap")
 }
 
+fn has_toml(folder: &Path) -> bool {
+    let is_toml = |path: &Path| path.extension().is_some_and(|end| end == "toml");
+    std::fs::read_dir(folder).is_ok_and(|entries| entries.flatten().any(|entry| is_toml(&entry.path())))
+}
+
 /// Returns the recordings in a folder by name, or `None` for a file.
 fn recordings_in(folder: &Path) -> Result<Option<Vec<PathBuf>>, String> {
     if !folder.is_dir() {
@@ -50,7 +55,14 @@ fn recordings_in(folder: &Path) -> Result<Option<Vec<PathBuf>>, String> {
     let entries: Vec<PathBuf> = std::fs::read_dir(folder)
         .and_then(|entries| entries.map(|entry| entry.map(|entry| entry.path())).collect())
         .map_err(cannot)?;
-    let mut found: Vec<PathBuf> = entries.into_iter().filter(|path| is_recording(path)).collect();
+    // `run.1.mcap` is the second part of `run.mcap`, which names it.
+    let is_part = |path: &PathBuf| {
+        let whole = path.file_stem().map(Path::new).filter(|stem| {
+            stem.extension().is_some_and(|number| number.to_string_lossy().bytes().all(|byte| byte.is_ascii_digit()))
+        });
+        whole.and_then(Path::file_stem).is_some_and(|stem| path.with_file_name(stem).with_extension("mcap").exists())
+    };
+    let mut found: Vec<PathBuf> = entries.into_iter().filter(|path| is_recording(path) && !is_part(path)).collect();
     found.sort();
     Ok(Some(found))
 }
@@ -65,7 +77,11 @@ pub(super) fn report(args: ReportArgs, shell: &Shell) -> Result<u8, u8> {
             None if is_recording(&file) => recordings.push(file),
             None => scenarios.push(file),
             Some(found) if found.is_empty() => scenarios.push(file),
-            Some(found) => recordings.extend(found),
+            Some(found) => {
+                // A folder may have scenarios beside its recordings.
+                scenarios.extend(Some(file).filter(|folder| has_toml(folder)));
+                recordings.extend(found);
+            }
         }
     }
     let mut code = 0;
