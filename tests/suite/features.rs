@@ -217,7 +217,12 @@ fn times_without_a_unit_that_can_hardly_be_seconds_are_asked_about() {
 fn one_of_several_pads_is_selected() {
     let file = "tests/data/recordings/xsensor_insoles.csv";
     let asked = say(&["features", file]);
-    assert!(asked.code == 2 && asked.err.contains("`tactflow features`: add `--pad \"LF S0073\"`"), "{}", asked.err);
-    let [left, right] = ["LF S0073", "RF S0073"].map(|pad| say(&["features", file, "--pad", pad]));
+    assert!(
+        asked.code == 2 && asked.err.contains("`tactflow features`: add `--pad \"HX210.11.31.M11-DFM-LF S0073\"`"),
+        "{}",
+        asked.err
+    );
+    let [left, right] = ["HX210.11.31.M11-DFM-LF S0073", "HX210.11.31.M11-DFM-RF S0073"]
+        .map(|pad| say(&["features", file, "--pad", pad]));
     assert!(left.code == 0 && right.code == 0 && left.out != right.out, "{}{}", left.err, right.err);
 }

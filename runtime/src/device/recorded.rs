@@ -85,6 +85,7 @@ impl RecordedDevice {
     }
 
     /// Returns the facts of each role in which the device sends values of that shape.
+    #[cfg(feature = "mcap")]
     pub(crate) fn facts_of(&self, shape: &Shape) -> Vec<toml::Table> {
         let fills =
             self.outputs.iter().filter(|port| port.shape == *shape).filter_map(|port| self.fills.get(port.fill));

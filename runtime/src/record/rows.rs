@@ -1,7 +1,10 @@
 //! The rows of a run, read from a file that `--out` has written.
 
+use std::fmt;
 use std::path::Path;
 
+use serde::de::{MapAccess, Visitor};
+use serde::{Deserialize, Deserializer};
 use serde_json::{Map, Value};
 
 use super::RecordFormat;
@@ -138,18 +141,46 @@ fn modes(line: &str) -> Option<TaskModes> {
     Some((task.to_owned(), list.split_whitespace().skip(1).step_by(2).map(str::to_owned).collect()))
 }
 
+/// What the first line of an NDJSON file has beside its row.
+#[derive(Deserialize)]
+struct Head {
+    units: Pairs,
+}
+
+/// The pairs of an object in the order of the file.
+struct Pairs(Vec<(String, String)>);
+
+impl<'de> Deserialize<'de> for Pairs {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        struct InOrder;
+        impl<'de> Visitor<'de> for InOrder {
+            type Value = Pairs;
+
+            fn expecting(&self, text: &mut fmt::Formatter<'_>) -> fmt::Result {
+                text.write_str("the unit of each column")
+            }
+
+            fn visit_map<A: MapAccess<'de>>(self, mut map: A) -> Result<Pairs, A::Error> {
+                let mut pairs = Vec::new();
+                while let Some(pair) = map.next_entry()? {
+                    pairs.push(pair);
+                }
+                Ok(Pairs(pairs))
+            }
+        }
+        deserializer.deserialize_map(InOrder)
+    }
+}
+
 fn ndjson(text: &str) -> Result<RunRows, String> {
     let mut rows = RunRows::default();
     for (i, line) in text.lines().enumerate() {
         let row: Map<String, Value> =
             serde_json::from_str(line).map_err(|_| format!("line {} is no JSON object", i + 1))?;
         if i == 0 {
-            let units = row.get("units").and_then(Value::as_object).ok_or("its first line has no `units`")?;
-            let unit = |unit: &Value| unit.as_str().unwrap_or_default().to_owned();
-            let columns = units.iter().filter(|(name, _)| *name != "time");
-            let column =
-                |(name, of): (&String, &Value)| RunColumn { name: name.clone(), unit: unit(of), values: Vec::new() };
-            rows.columns = columns.map(column).collect();
+            let head: Head = serde_json::from_str(line).map_err(|_| "its first line has no `units`")?;
+            let columns = head.units.0.into_iter().filter(|(name, _)| name != "time");
+            rows.columns = columns.map(|(name, unit)| RunColumn { name, unit, values: Vec::new() }).collect();
             let about = row.get("about").and_then(Value::as_array).into_iter().flatten();
             rows.modes = about.filter_map(|line| modes(line.as_str()?)).collect();
         }
@@ -187,6 +218,7 @@ mod tests {
             assert_eq!(by_name("mode").unit, "m/s");
             assert_eq!(found.modes, [(String::new(), vec!["approach".to_owned(), "servo".to_owned()])]);
             assert_eq!(found.port("arm.twist").unwrap().len(), 1);
+            assert!(found.columns.iter().map(|column| &*column.name).eq(names), "in the order of the file");
             let message = found.port("arm.twits").unwrap_err();
             assert!(message.starts_with("the file has no column `arm.twits`: "), "{message}");
         }

@@ -190,7 +190,7 @@ mod tests {
         let format = RecordFormat::Csv.rows(true);
         let (mut text, mut row) = (Vec::new(), [1_300_000_000, 1_763_866_339_123_456_789].map(f64::from_bits).to_vec());
         row.extend([0.5, f64::NAN, 1.0, -2.0]);
-        format.header(&columns, &mut text).expect("a vector takes everything");
+        format.header(&columns, &[], &mut text).expect("a vector takes everything");
         format.row(&columns, &row, &mut text).expect("a vector takes everything");
         let expected = "# time [s]\n# wall [s]\n# a.b [N]\n# \"mix.out.x,y\" [N]\n# \"mix.out.\"\"q\"\"\" [N]\n\
                         # \"arm.joint #1\" [N]\n\
