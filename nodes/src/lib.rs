@@ -90,6 +90,7 @@ pub fn catalogue() -> Catalogue {
         .node::<touch::binarize::Binarize>()
         .node::<touch::label::Label>()
         .node::<touch::select_region::SelectRegion>()
+        .node::<touch::region_count::RegionCount>()
         .node::<touch::image_window::ImageWindow>()
         .node::<touch::moments::Moments>()
         .node::<touch::principal_axes::PrincipalAxes>()

@@ -18,7 +18,11 @@ def of_csv(path):
     comments = [line for line in lines if line.startswith("#")]
     assert lines[: len(comments)] == comments, "comments stand before the header only"
     units = {}
-    for comment in comments:
+    of_columns = [comment for comment in comments if comment.endswith("]\n")]
+    about = comments[len(of_columns) :]
+    assert comments[: len(of_columns)] == of_columns, "units come first"
+    assert about and about[0].startswith("# tactflow "), about
+    for comment in of_columns:
         name, unit = comment[2:].rstrip("\n").split(" ", 1)
         assert unit.startswith("[") and unit.endswith("]"), comment
         assert name not in units, name
@@ -38,8 +42,10 @@ def of_ndjson(path):
     def refuse(word):
         raise AssertionError(f"{word} is no JSON")
 
-    first, *rows = [json.loads(line, parse_constant=refuse) for line in text.splitlines()]
-    return first["units"], rows
+    rows = [json.loads(line, parse_constant=refuse) for line in text.splitlines()]
+    units, about = rows[0].pop("units"), rows[0].pop("about")
+    assert about[0].startswith("tactflow "), about
+    return units, rows if rows[0] else []
 
 
 path = sys.argv[1]

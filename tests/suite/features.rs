@@ -133,3 +133,96 @@ fn a_pressure_becomes_a_force_and_the_whole_pad_has_a_centre_of_pressure() {
         said.out
     );
 }
+
+#[test]
+fn every_region_has_its_columns_and_the_picture_shows_the_way() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("two.csv");
+    // Two regions, of 2 by 3 and of 2 by 2 tactels; the second is lifted in the last frame.
+    let frame = |second: u32| {
+        let cell = |i: usize| match (i / 8, i % 8) {
+            (1 | 2, 0..=2) => 10,
+            (1 | 2, 5 | 6) => second,
+            _ => 0,
+        };
+        (0..32).map(|i| cell(i).to_string()).collect::<Vec<_>>().join(",")
+    };
+    fs::write(&path, format!("{}\n{}\n{}\n", frame(30), frame(30), frame(0))).unwrap();
+    let svg = folder.path().join("two.svg");
+    let (path, svg) = (path.to_str().unwrap(), svg.to_str().unwrap());
+    let args = [path, "--size", "4x8", "--unit", "N", "--pitch-mm", "5x5", "--rate-hz", "100", "--threshold", "1"];
+    let all = [&args[..], &["--regions", "all", "--svg", svg]].concat();
+    let found = columns(&all, ["regions.count", "region1.force", "region2.force", "region2.x"]);
+    assert_eq!(found[1], [2.0, 60.0, 120.0, 0.010]);
+    assert!(found[2][..2] == [1.0, 60.0] && found[2][2].is_nan(), "{found:?}");
+    let picture = fs::read_to_string(svg).unwrap();
+    for text in [">force [N]<", ">x [mm]<", ">y [mm]<", ">time [s]<", "class=\"first\"", "class=\"last\""] {
+        assert!(picture.contains(text), "{text}");
+    }
+    // Without a table, the picture is the only file, and the same.
+    let alone = folder.path().join("alone.svg");
+    let alone = alone.to_str().unwrap();
+    let said = say(&[&["features"], &args[..], &["--regions", "all", "--svg", alone]].concat());
+    assert_eq!((said.code, said.err.as_str()), (0, ""));
+    assert!(!said.out.contains("rows.csv") && said.out.ends_with(&format!("wrote {alone}\n")), "{}", said.out);
+    assert_eq!(fs::read_to_string(alone).unwrap(), picture);
+    let noisy = say(&[&["features"], &args[..], &["-o", "-", "--svg", alone]].concat());
+    assert!(noisy.code == 2 && noisy.err.contains("write `-o features.csv`"), "{}", noisy.err);
+}
+
+#[test]
+fn a_table_states_the_threshold() {
+    let folder = tempfile::tempdir().unwrap();
+    for ending in ["csv", "ndjson"] {
+        let path = folder.path().join(format!("features.{ending}"));
+        assert_eq!(say(&["features", PRESS, "--for", "1s", "-o", path.to_str().unwrap()]).code, 0);
+        let text = fs::read_to_string(path).unwrap();
+        assert!(text.contains("at least 4 tactels above 3.0000 raw (from the file)"), "{ending}");
+    }
+}
+
+#[test]
+fn times_without_a_unit_that_can_hardly_be_seconds_are_asked_about() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("times.csv");
+    let name = path.to_str().unwrap();
+    let args = ["features", name, "--unit", "N", "--pitch-mm", "5x5", "--threshold", "1"];
+    let write = |name: &str, times: [&str; 2]| {
+        let rows = times.map(|time| format!("{time},1,2,3,4\n"));
+        fs::write(&path, format!("{name},t0_0,t0_1,t1_0,t1_1\n{}", rows.concat())).unwrap();
+    };
+    for (times, unit, headline) in [
+        (["0", "10"], "ms", "2 frames in 0.01 s"),
+        (["1764000000000000000", "1764000000020000000"], "ns", "2 frames in 0.02 s"),
+        (["0", "5"], "s", "2 frames in 5.00 s"),
+    ] {
+        write("timestamp", times);
+        let asked = say(&args);
+        assert_eq!(asked.code, 2, "{times:?}");
+        let message = "`timestamp` has no unit, and can hardly be in seconds: ";
+        assert!(asked.err.contains(message) && asked.err.contains("`--time-unit ms`"), "{}", asked.err);
+        let said = say(&[&args[..], &["--time-unit", unit]].concat());
+        assert!(said.code == 0 && said.out.contains(headline), "{times:?}: {}{}", said.out, said.err);
+    }
+    write("time", ["0", "0.5"]);
+    assert_eq!(say(&args).code, 0, "half a second can be seconds");
+    write("time_ms", ["0", "10"]);
+    let other = say(&[&args[..], &["--time-unit", "s"]].concat());
+    assert!(other.code == 2 && other.err.contains("the name of the column gives another unit"), "{}", other.err);
+    let table = say(&["features", PRESS, "--time-unit", "s"]);
+    assert!(table.err.contains("only a `csv` file can have times without a unit"), "{}", table.err);
+}
+
+#[test]
+fn one_of_several_pads_is_selected() {
+    let file = "tests/data/recordings/xsensor_insoles.csv";
+    let asked = say(&["features", file]);
+    assert!(
+        asked.code == 2 && asked.err.contains("`tactflow features`: add `--pad \"HX210.11.31.M11-DFM-LF S0073\"`"),
+        "{}",
+        asked.err
+    );
+    let [left, right] = ["HX210.11.31.M11-DFM-LF S0073", "HX210.11.31.M11-DFM-RF S0073"]
+        .map(|pad| say(&["features", file, "--pad", pad]));
+    assert!(left.code == 0 && right.code == 0 && left.out != right.out, "{}{}", left.err, right.err);
+}

@@ -64,6 +64,7 @@ mod pads;
 mod pair;
 mod paths;
 mod peer;
+mod plot;
 mod points;
 mod policies;
 mod poor_controllers;

@@ -7,11 +7,12 @@ use tactflow_tests::catalogue;
 
 use crate::course::get;
 
-const NODES: [&str; 13] = [
+const NODES: [&str; 14] = [
     "tactile_source",
     "binarize",
     "label",
     "select_region",
+    "region_count",
     "image_window",
     "moments",
     "principal_axes",

@@ -34,7 +34,11 @@ impl Log {
     /// What is missing.
     pub fn new(recording: &Recording) -> Result<Self, String> {
         let Some(force) = recording.force.clone() else {
-            return Err("it has no reference force: add a column (or array) `force` [N] with one value a frame".into());
+            let what = match recording.format {
+                "mcap" => "name the port that measured it, as `--force truth.force`",
+                _ => "add a column (or array) `force` [N] with one value a frame",
+            };
+            return Err(format!("it has no reference force: {what}"));
         };
         let shape = &recording.shape;
         let mut cells = vec![0.0; shape.tactels() * recording.frames.len()];

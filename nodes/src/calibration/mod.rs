@@ -2,7 +2,7 @@
 //! tool.
 //!
 //! From a log of presses with a reference force to a curve for each tactel: [`log`] is the input, [`samples`] finds which tactel bore which force, [`fit`] fits its [`curve`], [`file`] writes
-//! and reads the curves, [`report`] measures how good they are and [`plot`] draws them, as Fig. 1 of the paper does.
+//! and reads the curves, [`report`] measures how good they are and [`plot`] draws it.
 //!
 //! From still postures of an arm: [`pad_mount`] is where the pad is on the tip, from one point that was touched in
 //! several postures, and [`tool_weight`] is the mass and the centre of mass of the tool, from the wrenches of a force

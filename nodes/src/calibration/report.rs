@@ -198,6 +198,13 @@ impl CalibrationReport {
         tactels.filter_map(|(i, (finding, tactel))| Some((i, finding, finding.points.as_ref()?, tactel.as_ref()?)))
     }
 
+    /// Returns the residual of each calibrated tactel as a fraction of the maximum force on it.
+    #[cfg(feature = "cli")]
+    pub(super) fn parts(&self) -> Vec<(usize, f64)> {
+        let kind = self.kind();
+        self.calibrated().map(|(i, finding, points, _)| (i, finding.part(kind, points))).collect()
+    }
+
     fn place(&self, i: usize) -> [usize; 2] {
         [i / self.calibration.cols, i % self.calibration.cols]
     }

@@ -293,20 +293,29 @@ fn the_report_has_results_with_units() {
 
 #[cfg(feature = "cli")]
 #[test]
-fn the_picture_has_every_tactel_and_the_mean_in_its_frame() {
+fn the_picture_shows_residuals_by_branch_and_a_map() {
     let mut pad = Pad::new(3, 4, &[7], 14);
-    let svg = plot::svg(&made(pad.uniform(2, 100), LoadKind::Uniform, None));
+    let report = made(pad.uniform(2, 100), LoadKind::Uniform, None);
+    let svg = plot::svg(&report);
+    let of = |class: &str| svg.matches(&format!("class=\"{class}\"")).count();
+    assert_eq!((of("dead"), of("worst"), of("left-out")), (1, 3, 0));
+    let map = svg.split("class=\"map\"").nth(1).unwrap().split("</g>").next().unwrap();
+    assert_eq!(map.matches("<rect").count(), 12, "a square for each tactel");
     let lines: Vec<&str> = svg.lines().filter(|line| line.starts_with("<polyline")).collect();
-    assert_eq!(lines.len(), 2 * 11 + 1, "two branches a tactel, and the mean");
+    // Two bands and the median of each branch, the line of zero, four quantiles, three curves, and the lines beside the names.
+    assert_eq!(lines.len(), 2 * 3 + 1 + 4 + 3 + (2 + 4 + 3));
     for line in lines {
         let points = line.split('"').nth(1).unwrap();
         let inside = |point: &str| {
             let (x, y) = point.split_once(',').unwrap();
             let (x, y): (f64, f64) = (x.parse().unwrap(), y.parse().unwrap());
-            (60.0..=706.0).contains(&x) && (22.0..=426.0).contains(&y)
+            (83.0..=961.0).contains(&x) && (40.0..=837.0).contains(&y)
         };
-        assert!(points.split(' ').count() > 10 && points.split(' ').all(inside), "{line}");
+        assert!(points.split(' ').all(inside), "{line}");
     }
-    assert!(svg.contains(">reading [raw]<") && svg.contains(">reference force on a tactel [N]<"));
+    let (worst, part) = report.parts().into_iter().max_by(|a, b| a.1.total_cmp(&b.1)).unwrap();
+    let name = format!("worst [{}, {}], {:.1} %<", worst / 4, worst % 4, 100.0 * part);
+    assert!(svg.contains(&name) && svg.contains(&format!("the worst: [{}, {}]", worst / 4, worst % 4)), "{name}");
+    assert!(svg.contains(">reading [raw]<") && svg.contains(">relative error [%]<"));
     assert!(svg.starts_with("<svg ") && svg.ends_with("</svg>\n") && !svg.contains("NaN"));
 }

@@ -13,7 +13,7 @@ use tactflow_runtime::source::{Code, quoted};
 
 use super::{Facts, pad};
 use crate::arm::mount::Mount;
-use crate::recordings::{self, Hints, Recording, Refusal};
+use crate::recordings::{self, Hints, Recording, Refusal, TIME_UNITS};
 
 /// Parameters of `recording`.
 #[derive(Debug, Clone, Param)]
@@ -33,8 +33,10 @@ pub struct Params {
     /// Numbers of rows and columns, if the file does not state them.
     #[param(range = 1..=1_000_000)]
     size: Option<[usize; 2]>,
-    /// Name of the pad to play, if the file has several.
+    /// Name of the pad to play, if the file has several; in a recording of a whole run, the role of the pad.
     pad: Option<String>,
+    /// Unit of the times of a `csv` file whose column does not name it: `s`, `ms`, `us` or `ns`.
+    time_unit: Option<TimeUnit>,
     /// Noise threshold that the pad states as a fact, in place of the one in the file.
     #[param(unit = "$unit", range = 0.0..)]
     threshold: Option<f64>,
@@ -58,6 +60,7 @@ pub struct Params {
 /// - `xsensor`: `.csv` of XSENSOR
 /// - `csv`: plain tables with one frame per row or one frame per block
 /// - `npy`, `npz`: arrays of numpy, frames x rows x columns
+/// - `mcap`: a recording of a whole run, as `run --record` writes it; another graph then runs on the pad of that run
 ///
 /// Any of them may be in a `.zip` or `.gz`. Pressures are converted to kPa, and forces to N.
 ///
@@ -106,6 +109,26 @@ impl Device for Player {
     }
 }
 
+/// Unit of the times of a file.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Param)]
+enum TimeUnit {
+    /// Seconds.
+    S,
+    /// Milliseconds.
+    Ms,
+    /// Microseconds.
+    Us,
+    /// Nanoseconds.
+    Ns,
+}
+
+impl TimeUnit {
+    /// Returns its size [s].
+    const fn seconds(self) -> f64 {
+        TIME_UNITS[self as usize].1
+    }
+}
+
 fn hints(params: &Params) -> Result<Hints, Mistakes> {
     let is_known = |name: &String| recordings::FORMATS.iter().any(|format| format.name == name);
     if let Some(format) = params.format.as_ref().filter(|format| !is_known(format)) {
@@ -121,6 +144,8 @@ fn hints(params: &Params) -> Result<Hints, Mistakes> {
         rate_hz: params.rate_hz,
         size: params.size,
         pad: params.pad.clone(),
+        force: None,
+        time_unit: params.time_unit.map(TimeUnit::seconds),
     })
 }
 

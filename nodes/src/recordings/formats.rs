@@ -5,6 +5,8 @@ use super::{csv, footscan, novel_asc, novel_lst, npy, tekscan, xsensor, zebris};
 
 /// All formats, those with the strictest recognition first.
 pub const FORMATS: &[FileFormat] = &[
+    #[cfg(feature = "mcap")]
+    super::mcap::FORMAT,
     npy::NPY,
     npy::NPZ,
     tekscan::FORMAT,

@@ -9,6 +9,8 @@ mod common;
 mod csv;
 mod footscan;
 mod formats;
+#[cfg(feature = "mcap")]
+mod mcap;
 mod novel_asc;
 mod novel_lst;
 mod npy;
@@ -21,8 +23,8 @@ mod zebris;
 mod testing;
 
 pub use common::{
-    Assumed, FileFormat, FileHead, Frame, HEAD_BYTES, Hints, MAX_CELLS, Parser, Recording, Refusal, TextError, Window,
-    text,
+    Assumed, FileFormat, FileHead, Frame, HEAD_BYTES, Hints, MAX_CELLS, Parser, Recording, Refusal, TIME_UNITS,
+    TextError, Window, text,
 };
 pub use formats::{FORMATS, list, recognise};
 pub use read::read;

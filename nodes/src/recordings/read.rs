@@ -22,5 +22,14 @@ fn read_plain(bytes: &[u8], name: &str, hints: &Hints) -> Result<Recording, Refu
         Some(name) => FORMATS.iter().find(|format| format.name == name),
         None => recognise(&FileHead::new(bytes, name)),
     };
-    format.map_or(Err(Refusal::Stranger), |format| format.read(bytes, hints))
+    let format = format.ok_or(Refusal::Stranger)?;
+    if hints.time_unit.is_some() && format.name != "csv" {
+        let message = format!("only a `csv` file can have times without a unit, and this one is `{}`", format.name);
+        return Err(Refusal::Contradicted { hint: "time_unit", message });
+    }
+    if hints.force.is_some() && format.name != "mcap" {
+        let message = format!("only a recording of a whole run has ports, and this file is `{}`", format.name);
+        return Err(Refusal::Contradicted { hint: "force", message });
+    }
+    format.read(bytes, hints)
 }

@@ -102,7 +102,10 @@ fn choose<'t>(text: &'t str, hints: &Hints) -> Result<Option<&'t str>, Refusal> 
             [only] => Ok(Some(only)),
             [first, ..] => Err(Refusal::Silent {
                 message: format!("the file has {} pads: {}", names.len(), list()),
-                help: format!("select one in the bench's device, as `pad = \"{}\"`", shortened(first)),
+                help: format!(
+                    "select one in the bench's device, as `pad = \"{0}\"` (`tactflow features`: add `--pad \"{0}\"`)",
+                    shortened(first)
+                ),
             }),
         };
     };

@@ -3,7 +3,8 @@
 //! A pad's image passes [`tactile_source`] (the sensor's frame) → [`calibrate`] → [`binarize`] → [`label`] (finds the
 //! contact) → [`moments`] (its position, force and orientation) → [`moving_average`].
 //!
-//! Besides them, [`select_region`] selects one of several regions, and [`image_window`] restricts one to a box;
+//! Besides them, [`select_region`] selects one of several regions, [`region_count`] counts them, and [`image_window`]
+//! restricts one to a box;
 //! [`hough`], [`eccentricity`], [`principal_axes`], [`contact_area`] and [`curvature`] measure the shape of a region;
 //! [`low_pass`] and [`median`] are other filters.
 
@@ -22,5 +23,6 @@ pub mod median;
 pub mod moments;
 pub mod moving_average;
 pub mod principal_axes;
+pub mod region_count;
 pub mod select_region;
 pub mod tactile_source;

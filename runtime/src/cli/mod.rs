@@ -16,6 +16,7 @@ mod check;
 mod completions;
 mod draw;
 mod explain;
+mod plot;
 #[cfg(feature = "mcap")]
 mod recorded;
 mod reference;
@@ -49,7 +50,7 @@ pub use reference::pages::reference;
 pub use run::{Commissioning, Job, JobOptions, Print, Proof, duration};
 pub use shell::command::{CommandEnd, GraphArgs, OutputFormat, Subcommand, derived};
 pub use shell::{FAULTED, INTERRUPTED, NOT_LOADED, Shell};
-pub use text::{svg, table::table};
+pub use text::{figure, svg, table::table};
 
 /// Tactile servoing from graph files.
 #[derive(Parser)]
@@ -88,6 +89,7 @@ impl Tool {
                 derived(describe::describe),
                 derived(show::show),
                 derived(draw::draw),
+                derived(plot::plot),
                 derived(completions::completions),
             ],
         };

@@ -84,6 +84,14 @@ impl RecordedDevice {
         }
     }
 
+    /// Returns the facts of each role in which the device sends values of that shape.
+    #[cfg(feature = "mcap")]
+    pub(crate) fn facts_of(&self, shape: &Shape) -> Vec<toml::Table> {
+        let fills =
+            self.outputs.iter().filter(|port| port.shape == *shape).filter_map(|port| self.fills.get(port.fill));
+        fills.map(|role| role.facts.iter().map(|fact| (fact.name.clone(), fact.value.clone())).collect()).collect()
+    }
+
     /// Returns the device for a replay. `None` if a port names a role that the device does not fill.
     pub(crate) fn open(&self) -> Option<Opened> {
         let fill = |role: &RecordedRole| Filled {

@@ -5,6 +5,8 @@ mod output;
 #[cfg(feature = "cli")]
 mod points;
 mod recorder;
+#[cfg(feature = "cli")]
+mod rows;
 mod writer;
 
 pub use columns::{PortColumn, PortColumns, recorded};
@@ -13,7 +15,11 @@ pub use output::{OutputFile, write_whole};
 pub(crate) use output::{Writing, not_read};
 #[cfg(feature = "cli")]
 pub use points::{PointPorts, PointRecorder, PointsRequest};
+#[cfg(feature = "mcap")]
+pub(crate) use recorder::mode_line;
 pub use recorder::{Recorded, Recorder};
+#[cfg(feature = "cli")]
+pub use rows::{RunColumn, RunRows, TaskModes};
 pub use writer::{RecordFormat, RowFormat};
 #[cfg(feature = "mcap")]
 pub(crate) use writer::{seconds as file_seconds, time_text as seconds_text};

@@ -85,6 +85,14 @@ impl OutputFile {
         })
     }
 
+    /// Writes what stands before the first row, or its end.
+    ///
+    /// # Errors
+    /// If it cannot be written.
+    pub(super) fn write_head(&mut self, text: &[u8]) -> io::Result<()> {
+        self.write_counted(text, |_| {}).map_err(|(_, error)| error)
+    }
+
     /// Writes bytes. On an error, returns how many were written before.
     pub(crate) fn write(&mut self, bytes: &[u8]) -> Result<(), (usize, io::Error)> {
         self.write_counted(bytes, |_| {})

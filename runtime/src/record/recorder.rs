@@ -53,14 +53,15 @@ impl Recorder {
     /// # Errors
     /// If the file cannot be created.
     pub fn create(path: &Path, format: RowFormat, engine: &Engine) -> io::Result<Self> {
-        Self::start(OutputFile::create(path)?, format, engine)
+        Self::start(OutputFile::create(path)?, format, engine, &[])
     }
 
-    /// Starts the thread that writes to an open file.
+    /// Starts the thread that writes to an open file. The file states the version of tactflow, the names of the modes, and
+    /// the lines `about` the run.
     ///
     /// # Errors
     /// If the thread cannot be started.
-    pub fn start(file: OutputFile, format: RowFormat, engine: &Engine) -> io::Result<Self> {
+    pub fn start(file: OutputFile, format: RowFormat, engine: &Engine, about: &[String]) -> io::Result<Self> {
         let columns = PortColumns::new(engine.ports());
         let tasks = task_columns(engine);
         let list: Vec<PortColumn> = tasks.iter().chain(&columns.list).cloned().collect();
@@ -69,8 +70,12 @@ impl Recorder {
         let (ring, drain) = RingBuffer::new(row.len() * RING_ROWS);
         let written = Arc::new(AtomicU64::new(0));
         let rows = written.clone();
-        let writing =
-            Writing::start(file, move |file| RowWriter { file, format, columns: &list, rows: &rows }.run(drain))?;
+        let version = format!("tactflow {}", env!("CARGO_PKG_VERSION"));
+        let modes = engine.tasks().iter().map(|task| mode_line(task.name(), task.mode_names()));
+        let about: Vec<String> = [version].into_iter().chain(modes.flatten()).chain(about.iter().cloned()).collect();
+        let writing = Writing::start(file, move |file| {
+            RowWriter { file, format, columns: &list, about: &about, rows: &rows }.run(drain)
+        })?;
         Ok(Self { columns, row, own, ring, writing, recorded: 0, written })
     }
 
@@ -153,11 +158,20 @@ fn with_modes(engine: &Engine) -> impl Iterator<Item = &TaskRun> {
     engine.tasks().iter().filter(|task| task.mode().is_some())
 }
 
+/// Returns the line with the numbers and the names of the modes of a task, or `None` for a task without modes.
+pub(crate) fn mode_line<'m>(task: &str, modes: impl Iterator<Item = &'m str>) -> Option<String> {
+    let of = if task.is_empty() { String::new() } else { format!(" of {task}") };
+    let modes: String = modes.enumerate().map(|(number, mode)| format!(" {number} {mode}")).collect();
+    (!modes.is_empty()).then(|| format!("modes{of}:{modes}"))
+}
+
 /// Formats and writes the rows, on a thread of its own.
 struct RowWriter<'w> {
     file: &'w mut OutputFile,
     format: RowFormat,
     columns: &'w [PortColumn],
+    /// Lines about the run.
+    about: &'w [String],
     /// Number of rows in the file.
     rows: &'w AtomicU64,
 }
@@ -166,8 +180,9 @@ impl RowWriter<'_> {
     /// Writes rows until the other end of the ring is gone.
     fn run(mut self, mut ring: Consumer<f64>) -> io::Result<()> {
         let (mut text, mut row) = (Vec::new(), vec![0.0; self.format.times() + self.columns.len()]);
-        self.format.header(self.columns, &mut text)?;
-        self.file.write_lines(&text, &AtomicU64::new(0))?;
+        self.format.header(self.columns, self.about, &mut text)?;
+        let mut has_row = false;
+        self.file.write_head(&text)?;
         text.clear();
         let mut flushed = Instant::now();
         loop {
@@ -177,10 +192,17 @@ impl RowWriter<'_> {
                 for (cell, value) in row.iter_mut().zip(chunk) {
                     *cell = value;
                 }
-                self.format.row(self.columns, &row, &mut text)?;
+                match std::mem::replace(&mut has_row, true) {
+                    true => self.format.row(self.columns, &row, &mut text)?,
+                    false => self.format.first_row(self.columns, &row, &mut text)?,
+                }
                 if text.len() >= CHUNK_BYTES {
                     self.flush(&mut text)?;
                 }
+            }
+            if is_over && !has_row {
+                self.format.end_of_header(&mut text)?;
+                return self.file.write_head(&text);
             }
             if is_over || flushed.elapsed() >= FLUSH_INTERVAL {
                 self.flush(&mut text)?;

@@ -11,9 +11,9 @@ use super::PortColumn;
 /// The format of a recording.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum RecordFormat {
-    /// Comma-separated values. Comments before the header list the units.
+    /// Comma-separated values. Comments before the header list the units, and what is known about the run.
     Csv,
-    /// One JSON object per line. The first line lists the units.
+    /// One JSON object per line. That of the first row has the units and what is known about the run, too.
     Ndjson,
 }
 
@@ -57,12 +57,14 @@ impl RowFormat {
         if self.has_wall { &["time", "wall"] } else { &["time"] }
     }
 
-    /// Writes the lines before the rows.
-    pub(crate) fn header(self, columns: &[PortColumn], out: &mut impl Write) -> io::Result<()> {
+    /// Writes what stands before the rows: the units, and the lines `about` the run. That of NDJSON is the beginning of the
+    /// first row, so that each line is a row.
+    pub(crate) fn header(self, columns: &[PortColumn], about: &[String], out: &mut impl Write) -> io::Result<()> {
         match self.format {
             RecordFormat::Csv => {
                 self.names().iter().try_for_each(|name| writeln!(out, "# {name} [s]"))?;
                 columns.iter().try_for_each(|column| writeln!(out, "# {} [{}]", cell(&column.name), column.unit))?;
+                about.iter().try_for_each(|line| writeln!(out, "# {}", line.replace(['\n', '\r'], " ")))?;
                 write!(out, "{}", self.names().join(","))?;
                 columns.iter().try_for_each(|column| write!(out, ",{}", cell(&column.name)))?;
                 writeln!(out)
@@ -73,9 +75,30 @@ impl RowFormat {
                 let units = columns.iter().map(|column| (column.name.as_str(), column.unit.to_string()));
                 let mut json = serde_json::Serializer::new(&mut *out);
                 json.collect_map(times.chain(units))?;
-                writeln!(out, "}}")
+                write!(out, ",\"about\":")?;
+                serde_json::to_writer(&mut *out, about)?;
+                Ok(())
             }
         }
+    }
+
+    /// Writes the end of what stands before the rows, if there is no row.
+    pub(super) fn end_of_header(self, out: &mut impl Write) -> io::Result<()> {
+        match self.format {
+            RecordFormat::Csv => Ok(()),
+            RecordFormat::Ndjson => writeln!(out, "}}"),
+        }
+    }
+
+    /// Writes the first row, after the header.
+    pub(crate) fn first_row(self, columns: &[PortColumn], row: &[f64], out: &mut Vec<u8>) -> io::Result<()> {
+        let begin = out.len();
+        self.row(columns, row, out)?;
+        if self.format == RecordFormat::Ndjson {
+            // The object was begun by the header.
+            out[begin] = b',';
+        }
+        Ok(())
     }
 
     /// Writes one row: the bits of the times [ns], and one value per column. NaN stands for an absent value.
@@ -167,7 +190,7 @@ mod tests {
         let format = RecordFormat::Csv.rows(true);
         let (mut text, mut row) = (Vec::new(), [1_300_000_000, 1_763_866_339_123_456_789].map(f64::from_bits).to_vec());
         row.extend([0.5, f64::NAN, 1.0, -2.0]);
-        format.header(&columns, &mut text).expect("a vector takes everything");
+        format.header(&columns, &[], &mut text).expect("a vector takes everything");
         format.row(&columns, &row, &mut text).expect("a vector takes everything");
         let expected = "# time [s]\n# wall [s]\n# a.b [N]\n# \"mix.out.x,y\" [N]\n# \"mix.out.\"\"q\"\"\" [N]\n\
                         # \"arm.joint #1\" [N]\n\

@@ -124,6 +124,14 @@ impl Contents {
     }
 }
 
+/// Describes a run in one line: the graph, and the hash of everything that determines it. Without the hash if a file of the
+/// graph cannot be read again.
+pub(crate) fn about_run(engine: &Engine, request: &Request, is_real: bool) -> String {
+    let contents = Contents::of(engine, request, (is_real, None));
+    let hash = contents.map_or_else(|_| String::new(), |contents| format!(", hash {}", contents.about.hash));
+    format!("graph {}{hash}", request.graph.display())
+}
+
 /// Returns all files that a graph has read: its texts, and the files that parameters name.
 fn files_of(sources: &SourceMap) -> Result<AttachedFiles, String> {
     let texts = sources.files().iter().filter(|file| file.name != SourceMap::COMMAND_LINE);

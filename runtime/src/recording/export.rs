@@ -1,6 +1,5 @@
 //! Exports a recording as CSV, or with its images as an archive of numpy arrays.
 
-use std::fmt::Write as _;
 use std::fs::File;
 use std::io::{self, BufWriter, Write};
 use std::path::Path;
@@ -12,7 +11,7 @@ use super::channels::LOST;
 use super::compare::grid_values;
 use super::reader::Recording;
 use super::table::{Table, lost_port};
-use crate::record::{RecordFormat, file_seconds};
+use crate::record::{RecordFormat, file_seconds, mode_line};
 
 /// What was exported.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -48,19 +47,8 @@ fn csv(
 ) -> Result<Exported, String> {
     let format = RecordFormat::Csv.rows(false);
     let mut table = Table::new(&recording);
-    let mut header = Vec::new();
-    format.header(&table.columns, &mut header).map_err(cannot)?;
-    // The names of the columns are the last line of the header.
-    let names = header
-        .iter()
-        .rposition(|byte| *byte != b'\n')
-        .and_then(|end| header[..end].iter().rposition(|byte| *byte == b'\n'));
-    let names = names.map_or(0, |end| end + 1);
-    let mut text = header[..names].to_vec();
-    for line in comments(&recording) {
-        text.extend_from_slice(format!("# {line}\n").as_bytes());
-    }
-    text.extend_from_slice(&header[names..]);
+    let mut text = Vec::new();
+    format.header(&table.columns, &comments(&recording), &mut text).map_err(cannot)?;
     let (mut ticks, mut row) = (0, vec![0.0; table.columns.len() + 1]);
     while let Some(tick) = recording.next_tick()? {
         let time = table.add(&recording, &tick);
@@ -80,15 +68,8 @@ fn comments(recording: &Recording) -> Vec<String> {
     let about = recording.about();
     let mut lines = vec![format!("tactflow {}, graph {}, hash {}", about.tactflow, about.graph.display(), about.hash)];
     lines.extend(about.seed.map(|seed| format!("seed {seed}")));
-    for (task, modes) in recording.modes() {
-        let of = if task.is_empty() { String::new() } else { format!(" of {task}") };
-        let mut line = format!("modes{of}:");
-        for (number, mode) in modes.iter().enumerate() {
-            // Writing to a string cannot fail.
-            let _ = write!(line, " {number} {mode}");
-        }
-        lines.push(line);
-    }
+    let modes = recording.modes();
+    lines.extend(modes.iter().filter_map(|(task, modes)| mode_line(task, modes.iter().map(String::as_str))));
     lines
 }
 

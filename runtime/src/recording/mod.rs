@@ -24,6 +24,7 @@ mod compare;
 mod diff;
 mod export;
 mod json;
+mod pad;
 mod reader;
 mod recorder;
 mod recover;
@@ -35,10 +36,15 @@ mod table;
 mod writer;
 
 pub use about::RunAbout;
+#[cfg(feature = "cli")]
+pub(crate) use about::about_run;
 pub use compare::{Differences, PortDifference};
 pub use diff::{RecordingDiff, diff};
 pub use export::{Exported, export};
+pub use pad::{PadError, RecordedPad};
 pub use reader::{RecordedChannel, RecordedTick, Recording};
 pub use recorder::{RecordRequest, RunRecorded, RunRecorder};
 pub use recover::{Recovered, recover};
 pub use replay::{Replay, ReplayChanges, ReplayError, ReplayedTick, is_own_channel};
+#[cfg(feature = "cli")]
+pub(crate) use table::rows;

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 use std::fs::File;
-use std::io::{BufReader, Read};
+use std::io::{BufReader, Cursor, Read};
 use std::path::{Path, PathBuf};
 
 use mcap::records::{Channel, Record, op};
@@ -20,7 +20,7 @@ const BUFFER_BYTES: usize = 1 << 20;
 /// its reader trusts the lengths in it.
 pub(super) struct Records {
     path: PathBuf,
-    file: BufReader<File>,
+    file: Box<dyn Read + Send>,
     has_begun: bool,
     record: Vec<u8>,
     chunk: Chunk,
@@ -37,9 +37,12 @@ impl Records {
     /// If it cannot be opened.
     pub(super) fn open(path: &Path) -> Result<Self, String> {
         let file = File::open(path).map_err(|error| format!("cannot open `{}`: {error}", path.display()))?;
-        let (file, record) = (BufReader::with_capacity(BUFFER_BYTES, file), Vec::new());
-        let (path, chunk) = (path.to_owned(), Chunk::default());
-        Ok(Self { path, file, has_begun: false, record, chunk, is_complete: false, is_cut: false })
+        Ok(Self::of(path, Box::new(BufReader::with_capacity(BUFFER_BYTES, file))))
+    }
+
+    fn of(path: &Path, file: Box<dyn Read + Send>) -> Self {
+        let (path, chunk, record) = (path.to_owned(), Chunk::default(), Vec::new());
+        Self { path, file, has_begun: false, record, chunk, is_complete: false, is_cut: false }
     }
 
     /// Passes the next record of the data to `take`, and returns what it makes of it. `None` at the end of the data or at
@@ -236,12 +239,30 @@ impl Recording {
     /// # Errors
     /// If it cannot be read, or was cut before the first tick.
     pub fn open(path: &Path) -> Result<Self, String> {
-        let (records, contents, channels) = (Records::open(path)?, Contents::default(), BTreeMap::new());
-        let metadata = BTreeMap::new();
+        Self::begin(path, Records::open(path)?)
+    }
+
+    /// Opens a recording that is in memory. One that goes on in another file is refused at its end.
+    ///
+    /// # Errors
+    /// If it cannot be read, or was cut before the first tick.
+    pub fn of_bytes(bytes: Vec<u8>) -> Result<Self, String> {
+        let path = Path::new("the recording");
+        Self::begin(path, Records::of(path, Box::new(Cursor::new(bytes))))
+    }
+
+    fn begin(path: &Path, records: Records) -> Result<Self, String> {
+        let (contents, channels, metadata) = (Contents::default(), BTreeMap::new(), BTreeMap::new());
         let mut recording = Self { path: path.to_owned(), records, contents, channels, tick: None, metadata };
         recording.read()?;
         if recording.contents.about == RunAbout::default() {
             return Err(format!("`{}` is no recording of tactflow, or was cut at its start", path.display()));
+        }
+        if recording.tick.is_none() && !recording.records.is_complete() {
+            let name = path.display();
+            return Err(format!(
+                "`{name}` was cut before its first tick: it has files of the graph, but nothing of the run"
+            ));
         }
         Ok(recording)
     }

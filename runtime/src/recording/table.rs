@@ -1,6 +1,8 @@
 //! The rows of a recording: one per tick, with the last value of every scalar, as `run --out` writes them.
 
 use std::collections::BTreeMap;
+#[cfg(feature = "cli")]
+use std::path::Path;
 
 use serde_json::Value;
 
@@ -10,6 +12,8 @@ use super::reader::{RecordedTick, Recording};
 use super::schema::{ORIENTATION, POSITION};
 use crate::engine::Engine;
 use crate::record::PortColumn;
+#[cfg(feature = "cli")]
+use crate::record::{RunColumn, RunRows, file_seconds};
 use crate::signal::Unit;
 
 /// The columns of a recording, and the values after the last tick that was added.
@@ -93,6 +97,28 @@ impl Table {
             self.row[*first..first + count].fill(f64::NAN);
         }
     }
+}
+
+/// Reads all columns of a recording.
+///
+/// # Errors
+/// If it cannot be read.
+#[cfg(feature = "cli")]
+pub(crate) fn rows(path: &Path) -> Result<RunRows, String> {
+    let mut recording = Recording::open(path)?;
+    let mut table = Table::new(&recording);
+    let column = |column: &PortColumn| RunColumn {
+        name: column.name.clone(),
+        unit: column.unit.to_string(),
+        values: Vec::new(),
+    };
+    let mut rows =
+        RunRows { times: Vec::new(), columns: table.columns.iter().map(column).collect(), modes: recording.modes() };
+    while let Some(tick) = recording.next_tick()? {
+        rows.times.push(file_seconds(table.add(&recording, &tick)));
+        rows.columns.iter_mut().zip(&table.row).for_each(|(column, value)| column.values.push(*value));
+    }
+    Ok(rows)
 }
 
 /// Returns the port that a message on the topic of lost ports names.

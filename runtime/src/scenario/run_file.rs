@@ -5,9 +5,7 @@ use std::path::Path;
 
 use crate::engine::{End, Engine};
 use crate::graph::Request;
-#[cfg(feature = "mcap")]
-use crate::record::OutputFile;
-use crate::record::{RecordFormat, Recorder};
+use crate::record::{OutputFile, RecordFormat, Recorder};
 #[cfg(feature = "mcap")]
 use crate::recording::{RecordRequest, RunRecorder};
 
@@ -31,7 +29,8 @@ impl RunFile {
             let file = OutputFile::create(path)?;
             return RunRecorder::start(file, engine, &request).map(Self::Whole).map_err(io::Error::other);
         }
-        Recorder::create(path, RecordFormat::Csv.rows(false), engine).map(Self::Rows)
+        let about: Vec<String> = seed.map(|seed| format!("seed {seed}")).into_iter().collect();
+        Recorder::start(OutputFile::create(path)?, RecordFormat::Csv.rows(false), engine, &about).map(Self::Rows)
     }
 
     /// Adds the last tick.

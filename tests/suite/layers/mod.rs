@@ -47,6 +47,7 @@ const RUNTIME: &[&str] = &[
     "cli/run",
     "cli/draw",
     "cli/recorded",
+    "cli/plot",
     "cli/verify",
     "cli/report",
     "cli/reference",

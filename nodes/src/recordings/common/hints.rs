@@ -21,7 +21,14 @@ pub struct Hints {
     pub assumed: Option<Assumed>,
     /// Name of the pad, where a file has several.
     pub pad: Option<String>,
+    /// Name of the port that is the reference force, in a recording of a whole run.
+    pub force: Option<String>,
+    /// Unit of the times of a file that does not name it [s].
+    pub time_unit: Option<f64>,
 }
+
+/// The units of times: their names, and their size [s].
+pub const TIME_UNITS: [(&str, f64); 4] = [("s", 1.0), ("ms", 1e-3), ("us", 1e-6), ("ns", 1e-9)];
 
 /// Maximum relative difference between a number of the file and one of the bench: files round.
 const MAX_ROUNDING: f64 = 5e-3;

@@ -11,6 +11,6 @@ pub(super) mod units;
 pub(super) mod zip;
 
 pub use format::{FileFormat, FileHead, HEAD_BYTES, Parser};
-pub use hints::{Assumed, Hints};
+pub use hints::{Assumed, Hints, TIME_UNITS};
 pub use recording::{Frame, MAX_CELLS, Recording, Window};
 pub use refusal::{Refusal, TextError};

@@ -10,6 +10,8 @@ pub(super) struct CsvColumns {
     pub(super) size: [usize; 2],
     /// Factor from the file's times to seconds.
     pub(super) second: f64,
+    /// Name of the column with the time, if it gives no unit and no hint does.
+    pub(super) unlabelled: Option<String>,
     /// Role of each column.
     pub(super) roles: Vec<Role>,
 }
@@ -33,7 +35,8 @@ type Place = (u32, u32);
 impl CsvColumns {
     /// Returns columns that are tactels row by row.
     pub(super) fn plain(rows: usize, cols: usize) -> Self {
-        Self { size: [rows, cols], second: 1.0, roles: (0..rows * cols).map(Role::Tactel).collect() }
+        let roles = (0..rows * cols).map(Role::Tactel).collect();
+        Self { size: [rows, cols], second: 1.0, unlabelled: None, roles }
     }
 
     /// Reads a row of names. For tactels whose names have no row and column, the bench gives the size.
@@ -41,7 +44,8 @@ impl CsvColumns {
         let notation = names_of(names);
         let count = notation.fields(names).count();
         names.check(count <= MAX_CELLS, format_args!("{count} columns are more than the maximum of {MAX_CELLS}"))?;
-        let mut columns = Self { size: [0, 0], second: 1.0, roles: Vec::with_capacity(count) };
+        let roles = Vec::with_capacity(count);
+        let mut columns = Self { size: [0, 0], second: 1.0, unlabelled: None, roles };
         let (mut places, mut found) = (Vec::new(), 0);
         for name in notation.fields(names).map(unquoted) {
             let title = || shortened(name.text);
@@ -72,7 +76,22 @@ impl CsvColumns {
             let size = columns.settle(&places).map_err(|message| names.error(message))?;
             hints.size(Some(size))?
         };
+        columns.take_time_unit(hints)?;
         Ok(columns)
+    }
+
+    /// Takes over the unit of the times from the hints.
+    fn take_time_unit(&mut self, hints: &Hints) -> Result<(), Refusal> {
+        let Some(second) = hints.time_unit else { return Ok(()) };
+        let refused = |message: &str| Err(Refusal::Contradicted { hint: "time_unit", message: message.into() });
+        if !self.roles.contains(&Role::Time) {
+            return refused("the file has no column with the time");
+        }
+        if self.unlabelled.take().is_none() && second.to_bits() != self.second.to_bits() {
+            return refused("the name of the column gives another unit");
+        }
+        self.second = second;
+        Ok(())
     }
 
     /// Gives each tactel the index of its place, and returns the size of the array. Places count from 0 or from 1, and
@@ -127,6 +146,7 @@ impl CsvColumns {
             _ if base == "t" => return Ok(None),
             _ => return Err(name.error("the unit of a time must be `s`, `ms`, `us` or `ns`")),
         };
+        self.unlabelled = unit.is_empty().then(|| shortened(name.text).to_string());
         Ok(Some(Role::Time))
     }
 }

@@ -23,6 +23,11 @@ use crate::recordings::common::{FileFormat, FileHead, Hints, Recording, Refusal,
 pub(super) const FORMAT: FileFormat =
     FileFormat::text("csv", "plain CSV, a frame a row or a frame a block", recognises, parse);
 
+/// Maximum time between the first two frames where the times have no unit [s].
+const MAX_UNLABELLED_STEP_S: f64 = 2.0;
+/// Maximum time where it has no unit: beyond it, the time since 1970 in seconds would be in the year 5138.
+const MAX_UNLABELLED_S: f64 = 1e11;
+
 /// Minimum number of tactels.
 const MIN_TACTELS: usize = 3;
 
@@ -93,7 +98,11 @@ fn parse(text: &str, hints: &Hints) -> Result<Recording, Refusal> {
     };
     bounded(rows, cols).map_err(|message| first.error(message))?;
     first.check(rows * cols >= MIN_TACTELS, format_args!("an image needs at least {MIN_TACTELS} tactels"))?;
-    let mut reader = CsvReader { reel: Reel::default(), size, start: None, force: vec![] };
+    let mut reader = CsvReader { reel: Reel::default(), size, start: None, unlabelled: None, force: vec![] };
+    if let FrameLayout::Row(columns) = &layout {
+        // A calibration does not depend on times.
+        reader.unlabelled = columns.unlabelled.clone().filter(|_| hints.assumed.is_none());
+    }
     reader.reserve(lines.clone());
     match layout {
         FrameLayout::Row(columns) => reader.rows(lines.clone(), names, &columns)?,
@@ -148,6 +157,8 @@ struct CsvReader {
     size: [usize; 2],
     /// Time of the first frame [s].
     start: Option<f64>,
+    /// Name of the column with the time, if nothing gives its unit.
+    unlabelled: Option<String>,
     /// Forces of another sensor [N]; empty if the file has none.
     force: Vec<f64>,
 }
@@ -206,6 +217,20 @@ impl CsvReader {
     /// Returns a time since the first [ns].
     fn since_start(&mut self, seconds: f64, at: Piece<'_>) -> Result<i64, TextError> {
         let since = seconds - *self.start.get_or_insert(seconds);
+        if let Some(name) = &self.unlabelled
+            && self.reel.frames.len() <= 1
+            && (since > MAX_UNLABELLED_STEP_S || seconds.abs() > MAX_UNLABELLED_S)
+        {
+            let what = match since > 0.0 {
+                true => format!("{since} from one frame to the next"),
+                false => format!("{seconds} in the first frame"),
+            };
+            return Err(at.error(format!(
+                "`{name}` has no unit, and can hardly be in seconds: {what}; name the column `{name}_ms` if these are \
+                 milliseconds, or give the unit: `time_unit = \"ms\"` for the device in the bench, `--time-unit ms` for \
+                 `tactflow features` (s, ms, us, ns)"
+            )));
+        }
         at.check(since >= 0.0 || since.is_nan(), "the time goes back")?;
         at.check(since < 1e9, "a time must be a number, at most 1e9 s after the first frame")?;
         self.reel.time(since * 1e9, at)

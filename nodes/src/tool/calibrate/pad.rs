@@ -48,6 +48,12 @@ pub(super) struct PadArgs {
     /// Unit of the readings, if a log does not give it; by default raw
     #[arg(long)]
     unit: Option<Unit>,
+    /// The port with the reference force, if a log is a recording of a whole run (.mcap): truth.force
+    #[arg(long, value_name = "PORT")]
+    force: Option<String>,
+    /// The role of the pad, if a log is a recording of a whole run with several pads
+    #[arg(long, value_name = "ROLE")]
+    pad: Option<String>,
     /// Rows and columns, if a log does not give them: 16x16
     #[arg(long, value_name = "ROWSxCOLS", value_parser = pair::<NonZeroUsize>)]
     size: Option<[NonZeroUsize; 2]>,
@@ -140,6 +146,8 @@ fn read(path: &Path, args: &PadArgs, shell: &Shell) -> Result<Log, u8> {
         format: args.format.clone(),
         unit: args.unit,
         size: args.size.map(|size| size.map(NonZeroUsize::get)),
+        force: args.force.clone(),
+        pad: args.pad.clone(),
         assumed: Some(ASSUMED),
         ..Hints::default()
     };
@@ -160,6 +168,9 @@ fn refused(refusal: Refusal, name: &str, shell: &Shell) -> u8 {
         Refusal::Broken { message, help } => {
             let help = help.map_or_else(String::new, |help| format!("; {help}"));
             format!("`{name}`: {message}{help}")
+        }
+        Refusal::Silent { message, .. } if message.contains(" pads: ") => {
+            format!("`{name}`: {message}; select one with `--pad`")
         }
         Refusal::Silent { message, .. } => format!("`{name}`: {message}; add it, as `--size 16x16`"),
         Refusal::Contradicted { hint, message } => format!("`{name}`: `{hint}`: {message}"),

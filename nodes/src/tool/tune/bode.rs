@@ -5,7 +5,7 @@
 use std::f64::consts::PI;
 
 use nalgebra::Complex;
-use tactflow_runtime::cli::svg::{PlotAxis, Svg};
+use tactflow_runtime::cli::svg::{INK, PlotAxis, STYLES, Svg};
 
 use super::experiment::Line;
 use super::{Tuned, TunedFeature, fit};
@@ -29,16 +29,6 @@ const POINTS: usize = 200;
 /// Range of the magnitude [dB], and of the phase [deg].
 const MAGNITUDE: [f64; 2] = [-50.0, 30.0];
 const PHASE: [f64; 2] = [-360.0, 0.0];
-
-/// The colour and the dashes of each contact: colours that differ for colour-blind readers, and dashes for grey prints.
-const STYLES: [(&str, &str); 6] = [
-    ("#3d85c6", ""),
-    ("#d9730d", "9 4"),
-    ("#009e73", "3 3"),
-    ("#cc79a7", "9 3 2 3"),
-    ("#8a8a00", "15 4"),
-    ("#c8553d", "2 5"),
-];
 
 /// Returns the picture of all features.
 pub(super) fn svg(tuned: &Tuned) -> String {
@@ -76,7 +66,7 @@ fn block(svg: &mut Svg, feature: &TunedFeature, top: f64) -> f64 {
     svg.axes(hz, phase, [Some("frequency [Hz]"), Some("phase of L [deg]")]);
     // Where the margins are read.
     for at in [magnitude.at(0.0), phase.at(-180.0)] {
-        svg.group("fill=\"none\" stroke=\"#888888\"", |svg| svg.polyline(ACROSS.map(|x| [x, at])));
+        svg.group(&format!("fill=\"none\" stroke=\"{INK}\""), |svg| svg.polyline(ACROSS.map(|x| [x, at])));
     }
     let measured = feature.loops.iter().filter(|(i, _)| feature.answers[*i].refused.is_none());
     for (i, around) in measured {

@@ -2,11 +2,10 @@
 
 use super::layout::{LINES, Layout, PlacedArrow, Rectangle, place};
 use super::picture::{Arrow, Look, Picture, PictureBox, PictureGroup};
-use crate::cli::text::svg::Svg;
+use crate::cli::text::svg::{INK, Svg};
 
-/// Colours of what is outside of the graph, of boxes, and of frames and arrows.
+/// Colour of what is outside of the graph. Boxes, frames and arrows have that of text.
 const OUTER: &str = "#3d85c6";
-const INNER: &str = "#888888";
 
 /// Returns the picture as a document.
 pub(super) fn text(picture: &Picture) -> String {
@@ -14,7 +13,7 @@ pub(super) fn text(picture: &Picture) -> String {
     let mut svg = Svg::new(size, &picture.title);
     svg.put(format_args!(
         "<defs><marker id=\"head\" viewBox=\"0 0 8 8\" refX=\"8\" refY=\"4\" markerWidth=\"8\" markerHeight=\"8\" \
-         orient=\"auto\"><path d=\"M0 0L8 4L0 8z\" fill=\"{INNER}\"/></marker></defs>"
+         orient=\"auto\"><path d=\"M0 0L8 4L0 8z\" fill=\"{INK}\"/></marker></defs>"
     ));
     for (group, place) in picture.groups.iter().zip(groups) {
         draw_group(&mut svg, group, place);
@@ -29,7 +28,7 @@ pub(super) fn text(picture: &Picture) -> String {
 }
 
 fn draw_group(svg: &mut Svg, group: &PictureGroup, place: Rectangle) {
-    rectangle(svg, place, &format!("rx=\"4\" stroke=\"{INNER}\" stroke-dasharray=\"4 4\" fill=\"none\""));
+    rectangle(svg, place, &format!("rx=\"4\" stroke=\"{INK}\" stroke-dasharray=\"4 4\" fill=\"none\""));
     let [left, top] = corner(place);
     svg.text([left + 4.0, top - 5.0], "start", &group.name);
 }
@@ -37,7 +36,7 @@ fn draw_group(svg: &mut Svg, group: &PictureGroup, place: Rectangle) {
 fn draw_box(svg: &mut Svg, one: &PictureBox, place: Rectangle) {
     let (colour, round) = match one.look {
         Look::Outer => (OUTER, 12),
-        Look::Inner => (INNER, 3),
+        Look::Inner => (INK, 3),
     };
     let style =
         format!("rx=\"{round}\" stroke=\"{colour}\" stroke-width=\"1.5\" fill=\"{colour}\" fill-opacity=\"0.12\"");
@@ -50,7 +49,7 @@ fn draw_box(svg: &mut Svg, one: &PictureBox, place: Rectangle) {
 
 fn draw_arrow(svg: &mut Svg, arrow: &Arrow, place: &PlacedArrow) {
     let dashes = if arrow.is_dashed { " stroke-dasharray=\"6 4\"" } else { "" };
-    let style = format!("fill=\"none\" stroke=\"{INNER}\" stroke-opacity=\"0.8\" marker-end=\"url(#head)\"{dashes}");
+    let style = format!("fill=\"none\" stroke=\"{INK}\" stroke-opacity=\"0.8\" marker-end=\"url(#head)\"{dashes}");
     svg.group(&style, |svg| svg.polyline(place.points.iter().copied()));
     let Some([x, y]) = place.text else { return };
     let first = y - LINES[1] * (arrow.lines.len() as f64 - 1.0) / 2.0 + 3.5;

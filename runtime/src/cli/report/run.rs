@@ -16,7 +16,7 @@ use crate::recording::{Replay, ReplayedTick};
 /// Adds a run to the page. Returns how the replay differs from the recording, if it does.
 pub(super) fn add(page: &mut HtmlPage, name: &str, mut replay: Replay) -> Result<Option<String>, String> {
     let begin = Instant::now();
-    let mut summary = Summary::new(replay.engine(), false, None);
+    let mut summary = Summary::new(replay.engine(), false, None).without_hint();
     // A graph that shows nothing has no picture.
     let mut still = Still::new(name, replay.engine()).ok();
     let fault = without_panic_messages(|| {

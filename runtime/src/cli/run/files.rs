@@ -95,16 +95,20 @@ impl<'j> OutputFiles<'j> {
         #[cfg(not(feature = "mcap"))]
         let whole = None;
         [&rows, &points, &svg, &whole].into_iter().flatten().try_for_each(|(path, file)| clear(path, file))?;
+        #[cfg(feature = "mcap")]
+        let about = crate::recording::about_run(engine, request, is_real);
+        #[cfg(not(feature = "mcap"))]
+        let about = format!("graph {}", request.graph.display());
+        let about: Vec<String> = [about].into_iter().chain(job.options.about.iter().cloned()).collect();
         let start = |((_, file), format): ((_, OutputFile), RecordFormat)| {
-            Recorder::start(file, format.rows(is_real), engine).map_err(|error| format!("cannot record: {error}"))
+            Recorder::start(file, format.rows(is_real), engine, &about)
+                .map_err(|error| format!("cannot record: {error}"))
         };
         let rows = rows.zip(format).map(start).transpose()?;
         let points = points.zip(chosen).map(|((_, file), chosen)| PointRecorder::new(file, chosen, engine));
         let still = still.zip(svg).map(|(still, (_, file))| (still, file));
         #[cfg(feature = "mcap")]
         let whole = whole.map(|file| WholeRun::start(file, engine, (request, is_real))).transpose()?;
-        #[cfg(not(feature = "mcap"))]
-        let _ = request;
         Ok(Self {
             job,
             rows,
@@ -200,7 +204,9 @@ fn report_rows(job: &Job, shell: &Shell, path: &Path, recorded: &Recorded) -> u8
             FAULTED
         }
         None => {
-            say_wrote(job, shell, path, "");
+            if !job.options.hides_out {
+                say_wrote(job, shell, path, "");
+            }
             0
         }
         // The reader closed the pipe, as `head` does, which is no error.

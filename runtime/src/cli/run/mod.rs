@@ -112,6 +112,12 @@ pub struct JobOptions {
     /// Draw the strongest image and the curves that the graph shows to an .svg file
     #[arg(long, value_name = "FILE")]
     pub svg: Option<PathBuf>,
+    /// Lines that `--out` states about the run, beside the version, the graph and the modes
+    #[arg(skip)]
+    pub about: Vec<String>,
+    /// Whether the file of `--out` is not mentioned, because it is an intermediate result
+    #[arg(skip)]
+    pub hides_out: bool,
 }
 
 /// What a run prints.

@@ -18,6 +18,8 @@ const MAX_BINS: usize = 256;
 pub(crate) struct Summary {
     limits: LimitWatch,
     body: Body,
+    /// Whether it ends with the option that shows more.
+    has_hint: bool,
 }
 
 /// The main part of a summary.
@@ -35,7 +37,12 @@ impl Summary {
             true => Body::Ports(PortTable::new(engine)),
             false => Body::View(Box::new(RunView::new(engine, MAX_BINS))),
         };
-        Self { limits: LimitWatch::new(engine, start), body }
+        Self { limits: LimitWatch::new(engine, start), body, has_hint: true }
+    }
+
+    /// Leaves out the option that shows more, for a page on which nobody types it.
+    pub(crate) fn without_hint(self) -> Self {
+        Self { has_hint: false, ..self }
     }
 
     /// Adds the last tick of the engine.
@@ -107,7 +114,9 @@ impl Summary {
         if outcome.late > 0 {
             let _ = writeln!(text, "{} ticks started more than one period late", outcome.late);
         }
-        if let Body::View(_) = self.body {
+        if let Body::View(_) = self.body
+            && self.has_hint
+        {
             let _ = writeln!(text, "`--ports` prints all ports and the time of each node");
         }
         text

@@ -11,7 +11,7 @@ use layout::{CHARACTER, CURVES, LINE, TOP, WIDTH};
 use panel::panels;
 
 use crate::cli::text::number::{is_flat, seconds};
-use crate::cli::text::svg::{PlotAxis, Svg};
+use crate::cli::text::svg::{INK, PlotAxis, Svg};
 use crate::cli::view::RunView;
 use crate::engine::{Engine, ModeChange};
 use crate::record::{OutputFile, write_whole};
@@ -84,7 +84,7 @@ fn draw(title: &str, view: &RunView, changes: &[ModeChange]) -> String {
 fn draw_modes(svg: &mut Svg, time: PlotAxis, changes: &[ModeChange], bottom: f64) {
     let mut lines: Vec<f64> = Vec::new();
     let mut ends = [f64::NEG_INFINITY; 2];
-    svg.group("class=\"modes\" stroke=\"#888888\" stroke-dasharray=\"2 3\"", |svg| {
+    svg.group(&format!("class=\"modes\" stroke=\"{INK}\" stroke-dasharray=\"2 3\""), |svg| {
         for change in changes {
             let x = time.at(seconds(change.time));
             // Lines in one column of pixels look like one.

@@ -3,7 +3,20 @@
 use std::fmt::{Display, Write};
 
 /// Colour of axes and text: of middle brightness, since a picture has no background of its own.
-const INK: &str = "#888888";
+pub const INK: &str = "#888888";
+
+/// Maximum number of ticks of an axis.
+const MAX_TICKS: usize = 11;
+
+/// The colour and the dashes of each curve: colours that differ for colour-blind readers, and dashes for grey prints.
+pub const STYLES: [(&str, &str); 6] = [
+    ("#3d85c6", ""),
+    ("#d9730d", "9 4"),
+    ("#009e73", "3 3"),
+    ("#c2558f", "9 3 2 3"),
+    ("#8a8a00", "15 4"),
+    ("#c8553d", "2 5"),
+];
 
 /// An SVG document under construction.
 #[derive(Debug, Clone)]
@@ -68,7 +81,9 @@ impl Svg {
             x.ticks().iter().for_each(|tick| self.text([x.at(*tick), bottom + 19.0], "middle", &number(*tick)));
             self.text([0.5 * (left + right), bottom + 42.0], "middle", title);
         }
-        let turn = format!("translate({:.1} {:.1}) rotate(-90)", left - 46.0, 0.5 * (top + bottom));
+        let widest = y.ticks().iter().map(|tick| number(*tick).chars().count()).max().unwrap_or(0);
+        let beside = (19.0 + 7.2 * widest as f64).max(46.0);
+        let turn = format!("translate({:.1} {:.1}) rotate(-90)", left - beside, 0.5 * (top + bottom));
         let title = escaped(y_title.unwrap_or_default());
         self.put(format_args!("<text text-anchor=\"middle\" transform=\"{turn}\" fill=\"{INK}\">{title}</text>"));
     }
@@ -117,15 +132,22 @@ impl PlotAxis {
     }
 
     /// Returns four to eleven round numbers along the axis, or fewer if it is shorter than 200 px. On a logarithmic axis
-    /// they are 1, 2 and 5 times the powers of ten.
+    /// they are 1, 2 and 5 times the powers of ten, or only powers of ten where these are too many.
     #[must_use]
     pub fn ticks(&self) -> Vec<f64> {
         // Parsed, since a product of tens is not exact.
         let powers = (-12..12).filter_map(|k| format!("1e{k}").parse::<f64>().ok());
         if self.is_log {
-            let all = powers.flat_map(|power| [power, 2.0 * power, 5.0 * power]);
             let [least, most] = [self.from * (1.0 - 1e-9), self.to * (1.0 + 1e-9)];
-            return all.filter(|tick| (least..=most).contains(tick)).collect();
+            let is_on = |tick: &f64| (least..=most).contains(tick);
+            let all = powers.clone().flat_map(|power| [power, 2.0 * power, 5.0 * power]);
+            let all: Vec<f64> = all.filter(is_on).collect();
+            if all.len() <= MAX_TICKS {
+                return all;
+            }
+            let powers: Vec<f64> = powers.filter(is_on).collect();
+            let every = powers.len().div_ceil(MAX_TICKS).max(1);
+            return powers.into_iter().step_by(every).collect();
         }
         let length = (self.pixels[1] - self.pixels[0]).abs();
         let raw = (self.to - self.from) / if length < 200.0 { 2.0 } else { 5.0 };
@@ -138,7 +160,13 @@ impl PlotAxis {
 
 /// Formats a number without the rounding errors of binary fractions.
 fn number(value: f64) -> String {
-    format!("{}", (value * 1e9).round() / 1e9 + 0.0)
+    if value == 0.0 || (1e-3..1e6).contains(&value.abs()) {
+        return format!("{}", (value * 1e9).round() / 1e9 + 0.0);
+    }
+    let text = format!("{value:.3e}");
+    let (digits, power) = text.split_once('e').unwrap_or((&text, "0"));
+    let digits = digits.trim_end_matches('0').trim_end_matches('.');
+    format!("{digits}e{power}")
 }
 
 /// Escapes the characters that have a meaning in XML.
@@ -175,6 +203,17 @@ mod tests {
         let axis = PlotAxis::log(0.1, 10.0, [0.0, 200.0]);
         assert_eq!([axis.at(0.1), axis.at(1.0), axis.at(10.0)].map(f64::round), [0.0, 100.0, 200.0]);
         assert_eq!(axis.ticks(), [0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0]);
+        assert_eq!(PlotAxis::log(1e-2, 1e3, [0.0, 200.0]).ticks(), [0.01, 0.1, 1.0, 10.0, 100.0, 1000.0]);
+        assert!(PlotAxis::log(1e-12, 1e11, [0.0, 200.0]).ticks().len() <= MAX_TICKS);
+    }
+
+    #[test]
+    fn numbers_are_short_at_every_size() {
+        let cases =
+            [(0.1 + 0.2, "0.3"), (-4.0, "-4"), (2e-5, "2e-5"), (3.0 * 2e-6, "6e-6"), (0.0, "0"), (2.5e7, "2.5e7")];
+        for (value, text) in cases {
+            assert_eq!(number(value), text);
+        }
     }
 
     #[test]

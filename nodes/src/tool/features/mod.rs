@@ -2,14 +2,18 @@
 //!
 //! It makes an ordinary graph from the command line; `--graph` prints it as a starting point.
 
+mod graph;
+mod plot;
+
 use std::num::NonZeroU32;
 use std::path::PathBuf;
 
 use tactflow_runtime::cli::{Job, JobOptions, Print, Shell, clap, duration};
 use tactflow_runtime::graph::Request;
 
-use super::arguments::{pair, positive};
-use crate::recordings::{self, Hints, Recording};
+use super::arguments::{may_replace, pair, positive, write};
+use crate::recordings::{self, Hints, Recording, TIME_UNITS};
+use graph::{ContactRules, count_regions};
 
 /// Extract the features of the contact in a recording: position, force, line direction
 #[derive(clap::Parser)]
@@ -21,7 +25,11 @@ Examples:
   tactflow features press.csv -o features.csv
   tactflow features plate.zip --pitch-mm 5.08x7.62 --for 2s
   tactflow features pad.npy --pitch-mm 5x5 --rate-hz 250 --unit N --threshold 0.02 --min-area 6
-  tactflow features press.csv --graph > press.toml"
+  tactflow features press.csv --graph > press.toml
+  tactflow features insoles.csv --pad \"LF S0073\" --regions all -o left.csv --svg left.svg
+
+The columns `touch.…` are of the largest region, `whole.…` of all tactels above the threshold, and `regions.count`
+is the number of regions. With `--regions all`, `region1.…` is the largest region, `region2.…` the second, and so on."
 )]
 pub(super) struct FeaturesArgs {
     /// Recording, optionally in a .zip or .gz
@@ -29,9 +37,18 @@ pub(super) struct FeaturesArgs {
     /// Write one row per frame to a .csv or .ndjson file
     #[arg(short, long, value_name = "FILE")]
     out: Option<PathBuf>,
+    /// Draw the way of the centre of pressure, and the force over time, to an .svg file
+    #[arg(long, value_name = "FILE")]
+    svg: Option<PathBuf>,
     /// Print the graph and do not run it
-    #[arg(long, conflicts_with = "out")]
+    #[arg(long, conflicts_with_all = ["out", "svg"])]
     graph: bool,
+    /// Regions with columns of their own: only the largest one, or all
+    #[arg(long, value_enum, default_value_t = RegionChoice::Largest)]
+    regions: RegionChoice,
+    /// Name of the pad, if the file has several
+    #[arg(long, value_name = "NAME")]
+    pad: Option<String>,
     /// Threshold of a touched tactel [unit of the recording]; by default that of the file, or 5 % of its maximum
     #[arg(long, value_name = "VALUE", allow_hyphen_values = true, value_parser = finite)]
     threshold: Option<f64>,
@@ -56,6 +73,9 @@ pub(super) struct FeaturesArgs {
     /// Frames per second, if the file does not give it
     #[arg(long, value_name = "HZ", value_parser = positive)]
     rate_hz: Option<f64>,
+    /// Unit of the times, if a column of a CSV file does not name it: s, ms, us, ns
+    #[arg(long, value_name = "UNIT", value_parser = TIME_UNITS.map(|(name, _)| name))]
+    time_unit: Option<String>,
     /// Number of rows and columns, if the file does not give it: 16x16
     #[arg(long, value_name = "ROWSxCOLS", value_parser = pair::<NonZeroU32>)]
     size: Option<[NonZeroU32; 2]>,
@@ -64,36 +84,100 @@ pub(super) struct FeaturesArgs {
     duration: Option<f64>,
 }
 
+/// Which regions have columns of their own.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
+#[value(rename_all = "lower")]
+enum RegionChoice {
+    /// The largest one.
+    Largest,
+    /// All of them.
+    All,
+}
+
 /// Default threshold of a touched tactel, as a fraction of the maximum value of the recording.
 const DEFAULT_THRESHOLD: f64 = 0.05;
+/// Maximum number of regions with columns of their own.
+const MAX_REGIONS: usize = 32;
 
-pub(super) fn features(args: FeaturesArgs, shell: &Shell) -> u8 {
-    let options = JobOptions { duration: args.duration, out: args.out.clone(), ..JobOptions::default() };
-    if let Err(message) = options.reserve_output(shell) {
-        return shell.refuse(message);
-    }
+pub(super) fn features(args: FeaturesArgs, shell: &Shell) -> Result<u8, u8> {
+    let refuse = |message: String| shell.refuse(message);
+    args.check().map_err(refuse)?;
+    let mut options = JobOptions { duration: args.duration, out: args.out.clone(), ..JobOptions::default() };
+    options.reserve_output(shell).map_err(refuse)?;
     let text = match args.read() {
         Some(recording) => {
             let (threshold, origin) = args.threshold(&recording);
-            let text = args.graph_text(threshold, &origin, newtons(&recording));
+            let mut rules = args.rules(&recording, threshold, &origin);
+            if args.regions == RegionChoice::All {
+                rules.regions = args.count(&rules, shell)?;
+            }
+            let text = args.graph_text(&rules);
             if args.graph {
                 shell.say(text.trim_end());
-                return 0;
+                return Ok(0);
             }
-            shell.say(&args.headline(&recording, threshold, &origin));
+            let headline = args.headline(&recording, threshold, &origin);
+            shell.say(&headline);
+            options.about = headline.lines().map(str::to_owned).collect();
             text
         }
         // The check of the graph reports what is wrong with the recording, once and at its place.
-        None => args.graph_text(0.0, "from --threshold", None),
+        None => args.graph_text(&ContactRules::default()),
     };
-    // As `--set`, so that a mistake shows in the arguments.
-    let set = args.settings().iter().map(|setting| format!("devices.recording.{setting}")).collect();
-    let request = Request { set, ..Request::text(text) };
+    // The picture is drawn from the rows, so that it shows what a table has.
+    let rows = tempfile::tempdir().map_err(|error| shell.refuse(format_args!("no temporary folder: {error}")))?;
+    let is_hidden = args.out.is_none() && args.svg.is_some();
+    if is_hidden {
+        options.out = Some(rows.path().join("rows.csv"));
+        options.hides_out = true;
+    }
+    let table = options.out.clone();
     let title = format!("features of {}", args.recording.display());
-    Job { request, title, options, print: Print::Ports }.run(shell)
+    let code = Job { request: args.request(text), title, options, print: Print::Ports }.run(shell);
+    match (&args.svg, table) {
+        (Some(svg), Some(table)) if code == 0 => {
+            let picture = plot::draw(&args.recording.display().to_string(), &table).map_err(refuse)?;
+            write(svg, &picture).map_err(refuse)?;
+            shell.say(&format!("wrote {}", svg.display()));
+            Ok(0)
+        }
+        _ => Ok(code),
+    }
 }
 
 impl FeaturesArgs {
+    /// Checks the files to write.
+    fn check(&self) -> Result<(), String> {
+        let Some(svg) = &self.svg else { return Ok(()) };
+        if self.out.as_ref().is_some_and(|out| out.as_os_str() == "-") {
+            return Err("`--svg` draws the rows of a file: write `-o features.csv` instead of `-o -`".into());
+        }
+        may_replace(svg, "an SVG picture", |text| text.starts_with("<svg "))
+    }
+
+    /// Returns the request of a graph, with the settings as `--set`, so that a mistake shows in the arguments.
+    fn request(&self, text: String) -> Request {
+        let set = self.settings().iter().map(|setting| format!("devices.recording.{setting}")).collect();
+        Request { set, ..Request::text(text) }
+    }
+
+    /// Returns what a contact is.
+    fn rules(&self, recording: &Recording, threshold: f64, origin: &str) -> ContactRules {
+        ContactRules { threshold, origin: origin.to_owned(), newtons: newtons(recording), regions: 0 }
+    }
+
+    /// Returns the largest number of regions in one frame.
+    fn count(&self, rules: &ContactRules, shell: &Shell) -> Result<usize, u8> {
+        let count = count_regions(&self.request(self.graph_text(rules)), self.duration, shell)?;
+        if count > MAX_REGIONS {
+            return Err(shell.refuse(format_args!(
+                "a frame has {count} regions, but at most {MAX_REGIONS} have columns of their own: raise `--threshold`, \
+                 `--min-area` or `--min-force`"
+            )));
+        }
+        Ok(count)
+    }
+
     /// Returns the recording, or `None` if it has mistakes. The graph reads it again.
     fn read(&self) -> Option<Recording> {
         let bytes = std::fs::read(&self.recording).ok()?;
@@ -103,6 +187,12 @@ impl FeaturesArgs {
             pitch: self.pitch_mm.map(|pitch| pitch.map(|mm| mm * 1e-3)),
             rate_hz: self.rate_hz,
             size: self.size.map(|size| size.map(|count| count.get() as usize)),
+            pad: self.pad.clone(),
+            time_unit: self
+                .time_unit
+                .as_ref()
+                .and_then(|unit| TIME_UNITS.iter().find(|(name, _)| name == unit))
+                .map(|unit| unit.1),
             ..Hints::default()
         };
         recordings::read(&bytes, &self.recording.to_string_lossy(), &hints).ok()
@@ -145,59 +235,9 @@ impl FeaturesArgs {
         )
     }
 
-    /// Returns the graph, without the settings of the recording from the command line. The threshold is in the unit of the
-    /// recording, and `newtons` is the force of one unit of a pressure on a tactel.
-    fn graph_text(&self, threshold: f64, origin: &str, newtons: Option<f64>) -> String {
-        let Self { min_area, min_force, window, .. } = self;
-        let (unit, forces) = match newtons {
-            Some(_) => ("N", "set.calibrate.unit = \"N\"            # the pressure times the area of a tactel\n"),
-            None => ("unit of the recording", ""),
-        };
-        let origin = newtons.map_or_else(|| origin.to_owned(), |_| format!("{threshold} kPa, {origin}"));
-        let threshold = threshold * newtons.unwrap_or(1.0);
-        let mut text = format!(
-            r#"# The features of the contact in a recording.
-[graph]
-clock = "pad"
-
-[roles]
-pad = "tactile_pad"
-
-[parts.touch]
-file = "builtin:parts/touch.toml"
-in.image = "pad.image"
-set.calibrate.dead = {{ from = "pad.dead" }}
-{forces}set.binarize.threshold = {threshold:?}       # [{unit}], {origin}
-set.label = {{ min_area = {min_area}, min_force = {min_force:?} }}   # [tactels, {unit}]
-set.pressure.window = {window}
-set.orientation.window = {window}
-
-[nodes.touched]                     # all tactels above the threshold, in all regions
-type = "binarize"
-in.image = "touch.repaired"
-threshold = {threshold:?}
-
-[nodes.whole]                       # the force and the centre of pressure of the whole pad
-type = "moments"
-in.image = "touch.repaired"
-in.region = "touched.mask"
-
-[bind]
-pad = "recording"
-
-[devices.recording]
-type = "recording"
-"#
-        );
-        if self.graph {
-            self.settings().iter().for_each(|setting| text.push_str(&format!("{setting}\n")));
-        }
-        text
-    }
-
     /// Returns the parameters of the device from the command line.
     fn settings(&self) -> Vec<String> {
-        let Self { format, unit, pitch_mm, rate_hz, size, .. } = self;
+        let Self { format, unit, pitch_mm, rate_hz, size, pad, time_unit, .. } = self;
         let word = |text: &str| toml::Value::from(text).to_string();
         // A printed graph may be stored in any folder.
         let path = if self.graph { std::path::absolute(&self.recording).ok() } else { None };
@@ -209,6 +249,8 @@ type = "recording"
             ("pitch_mm", pitch_mm.map(|pitch| format!("{pitch:?}"))),
             ("rate_hz", rate_hz.map(|rate| format!("{rate:?}"))),
             ("size", size.map(|size| format!("{size:?}"))),
+            ("pad", pad.as_deref().map(word)),
+            ("time_unit", time_unit.as_deref().map(word)),
         ];
         settings.into_iter().filter_map(|(name, value)| Some(format!("{name} = {}", value?))).collect()
     }
