@@ -2,9 +2,14 @@
 
 use std::fmt::Write as _;
 use std::io::{Read as _, Write as _};
+use std::sync::atomic::{AtomicUsize, Ordering};
 
 use flate2::read::{DeflateDecoder, MultiGzDecoder};
 use tactflow_nodes::recordings::Hints;
+use tactflow_runtime::engine::{End, Engine};
+use tactflow_runtime::graph::{Request, compile};
+use tactflow_runtime::record::OutputFile;
+use tactflow_runtime::recording::{RecordRequest, RunRecorder};
 use tactflow_runtime::signal::Unit;
 
 use crate::workspace;
@@ -49,9 +54,35 @@ pub fn samples(frames: usize) -> Vec<Sample> {
         sample("npy", "images.npy", npy("|u1", &[frames, 2, 4], &vec![7; frames * 8]), &timed),
         packed("npz", "press.npz", npz(frames, 0), 0),
         packed("npz", "packed.npz", npz(frames, 8), npz(frames, 0).len()),
+        sample("mcap", "run.mcap", mcap(frames), &none),
         Sample { unpacked: plate.len(), ..sample("footscan", "plate.zip", zipped(8, &[("plate", &plate)]), &none) },
         Sample { unpacked: plate.len(), ..sample("footscan", "plate.gz", gzipped(&plate), &none) },
     ]
+}
+
+/// A recorded run of a pad with that many frames.
+fn mcap(frames: usize) -> Vec<u8> {
+    let text = "[graph]\nclock = \"pad\"\n[roles]\npad = \"tactile_pad\"\n[bind]\npad = \"pad\"\n[devices.pad]\n\
+                type = \"mock_pad\"\nrate_hz = 250\n[nodes.source]\ntype = \"tactile_source\"\nin.image = \"pad.image\"\n";
+    let request = Request::text(text.into());
+    let plan = compile(&crate::catalogue(), &request).unwrap_or_else(|report| panic!("{}", report.render(false)));
+    let mut engine = Engine::new(plan);
+    // Tests run side by side in one process.
+    static NUMBER: AtomicUsize = AtomicUsize::new(0);
+    let number = NUMBER.fetch_add(1, Ordering::Relaxed);
+    let path = std::env::temp_dir().join(format!("tactflow-sample-{}-{number}.mcap", std::process::id()));
+    let record = RecordRequest { request: &request, is_real: false, seed: None, path: None };
+    let file = OutputFile::create(&path).expect("a file");
+    let mut recorder = RunRecorder::start(file, &mut engine, &record).expect("it can be recorded");
+    while let Some(now) = engine.next().filter(|_| engine.ticks() < frames as u64) {
+        engine.tick(now).expect("no fault");
+        recorder.record(&engine, || true);
+    }
+    recorder.end(&engine, &End::Duration);
+    assert!(recorder.finish(|_| true).error.is_none());
+    let bytes = std::fs::read(&path).expect("it was written");
+    std::fs::remove_file(path).expect("it is there");
+    bytes
 }
 
 fn tekscan(frames: usize) -> Vec<u8> {

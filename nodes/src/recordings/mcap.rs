@@ -30,12 +30,11 @@ fn read(bytes: &[u8], hints: &Hints) -> Result<Recording, Refusal> {
             pad.images.len()
         )));
     };
-    let period = (end - start) as f64 * 1e-9 / (pad.images.len() - 1) as f64;
-    if !pad.images.is_sorted_by(|a, b| a.0 < b.0) || period <= 0.0 {
-        return Err(Refusal::broken("the times of its images go back"));
-    }
+    let duration = end.checked_sub(*start).filter(|_| pad.images.is_sorted_by(|a, b| a.0 < b.0));
+    let duration = duration.ok_or_else(|| Refusal::broken("the times of its images go back"))?;
+    let period = duration as f64 * 1e-9 / (pad.images.len() - 1) as f64;
     let (unit, pitch, period) = hints.complete(Some(pad.shape.unit), Some(pad.shape.pitch), Some(period))?;
-    let dead = dead(&pad.facts, cols);
+    let dead = dead(&pad.facts, [rows, cols]);
     let mut cells: Vec<f32> = Vec::with_capacity(pad.images.len() * rows * cols);
     let frame = |(i, (time, _)): (usize, &(i64, Vec<f32>))| Frame {
         number: i as u64,
@@ -53,14 +52,16 @@ fn read(bytes: &[u8], hints: &Hints) -> Result<Recording, Refusal> {
 }
 
 /// Returns the indices of the tactels that the pad states as dead, as `[row, column]`.
-fn dead(facts: &toml::Table, cols: usize) -> Vec<usize> {
+fn dead(facts: &toml::Table, [rows, cols]: [usize; 2]) -> Vec<usize> {
     let places = facts.get("dead").and_then(toml::Value::as_array).into_iter().flatten();
     let index = |place: &toml::Value| {
         let at = |i: usize| usize::try_from(place.get(i)?.as_integer()?).ok();
-        Some(at(0)? * cols + at(1)?)
+        let (row, col) = (at(0)?, at(1)?);
+        (row < rows && col < cols).then(|| row * cols + col)
     };
     let mut dead: Vec<usize> = places.filter_map(index).collect();
     dead.sort_unstable();
+    dead.dedup();
     dead
 }
 

@@ -10,6 +10,9 @@ use crate::usual::{USUAL_CONTACT_N, unusual_force};
 /// Regions with less than `min_area` tactels or less than `min_force` are not counted, as `select_region` leaves them
 /// out. `count` is 0 on an untouched pad, and absent only while `regions` is.
 ///
+/// Use it in a condition of a mode that depends on how many objects touch the pad. `select_region` with `rank = 2` selects
+/// the second contact itself.
+///
 /// ```toml
 /// [nodes.region_count]
 /// type = "region_count"

@@ -36,7 +36,6 @@ mod table;
 mod writer;
 
 pub use about::RunAbout;
-#[cfg(feature = "cli")]
 pub(crate) use about::about_run;
 pub use compare::{Differences, PortDifference};
 pub use diff::{RecordingDiff, diff};

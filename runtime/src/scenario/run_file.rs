@@ -7,7 +7,7 @@ use crate::engine::{End, Engine};
 use crate::graph::Request;
 use crate::record::{OutputFile, RecordFormat, Recorder};
 #[cfg(feature = "mcap")]
-use crate::recording::{RecordRequest, RunRecorder};
+use crate::recording::{RecordRequest, RunRecorder, about_run};
 
 /// A recording of a run.
 pub(super) enum RunFile {
@@ -21,7 +21,6 @@ impl RunFile {
     ///
     /// # Errors
     /// If it cannot be created.
-    #[cfg_attr(not(feature = "mcap"), expect(unused_variables, reason = "only a whole run needs them"))]
     pub(super) fn create(path: &Path, engine: &mut Engine, request: &Request, seed: Option<u64>) -> io::Result<Self> {
         #[cfg(feature = "mcap")]
         if path.extension().is_some_and(|extension| extension == "mcap") {
@@ -29,7 +28,11 @@ impl RunFile {
             let file = OutputFile::create(path)?;
             return RunRecorder::start(file, engine, &request).map(Self::Whole).map_err(io::Error::other);
         }
-        let about: Vec<String> = seed.map(|seed| format!("seed {seed}")).into_iter().collect();
+        #[cfg(feature = "mcap")]
+        let graph = about_run(engine, request, false);
+        #[cfg(not(feature = "mcap"))]
+        let graph = format!("graph {}", request.graph.display());
+        let about: Vec<String> = [graph].into_iter().chain(seed.map(|seed| format!("seed {seed}"))).collect();
         Recorder::start(OutputFile::create(path)?, RecordFormat::Csv.rows(false), engine, &about).map(Self::Rows)
     }
 

@@ -16,6 +16,8 @@ pub(super) struct ContactRules {
     pub(super) origin: String,
     /// Force of one unit of a pressure on a tactel [N].
     pub(super) newtons: Option<f64>,
+    /// Noise that the file states [unit of the recording].
+    pub(super) noise: Option<f64>,
     /// Number of regions that have nodes of their own.
     pub(super) regions: usize,
 }
@@ -33,6 +35,9 @@ impl FeaturesArgs {
             None => rules.origin.clone(),
         };
         let threshold = rules.threshold * rules.newtons.unwrap_or(1.0);
+        // The part compares its threshold, in newtons, with the noise of the pad.
+        let noise = rules.noise.zip(rules.newtons).map(|(noise, newtons)| noise * newtons);
+        let noise = noise.map_or_else(String::new, |noise| format!("set.binarize.noise = {noise:?}           # [N]\n"));
         let mut text = format!(
             r#"# The features of the contact in a recording.
 [graph]
@@ -45,7 +50,7 @@ pad = "tactile_pad"
 file = "builtin:parts/touch.toml"
 in.image = "pad.image"
 set.calibrate.dead = {{ from = "pad.dead" }}
-{forces}set.binarize.threshold = {threshold:?}       # [{unit}], {origin}
+{forces}{noise}set.binarize.threshold = {threshold:?}       # [{unit}], {origin}
 set.label = {{ min_area = {min_area}, min_force = {min_force:?} }}   # [tactels, {unit}]
 set.pressure.window = {window}
 set.orientation.window = {window}

@@ -163,7 +163,13 @@ impl FeaturesArgs {
 
     /// Returns what a contact is.
     fn rules(&self, recording: &Recording, threshold: f64, origin: &str) -> ContactRules {
-        ContactRules { threshold, origin: origin.to_owned(), newtons: newtons(recording), regions: 0 }
+        ContactRules {
+            threshold,
+            origin: origin.to_owned(),
+            newtons: newtons(recording),
+            noise: recording.threshold,
+            regions: 0,
+        }
     }
 
     /// Returns the largest number of regions in one frame.
