@@ -64,7 +64,7 @@ pub fn samples(frames: usize) -> Vec<Sample> {
 fn mcap(frames: usize) -> Vec<u8> {
     let text = "[graph]\nclock = \"pad\"\n[roles]\npad = \"tactile_pad\"\n[bind]\npad = \"pad\"\n[devices.pad]\n\
                 type = \"mock_pad\"\nrate_hz = 250\n[nodes.source]\ntype = \"tactile_source\"\nin.image = \"pad.image\"\n";
-    let request = Request::text(text.into());
+    let request = Request::text(text);
     let plan = compile(&crate::catalogue(), &request).unwrap_or_else(|report| panic!("{}", report.render(false)));
     let mut engine = Engine::new(plan);
     // Tests run side by side in one process.
