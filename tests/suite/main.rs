@@ -67,6 +67,7 @@ mod peer;
 mod points;
 mod policies;
 mod poor_controllers;
+mod processes;
 mod quantities;
 mod rates;
 mod record;
