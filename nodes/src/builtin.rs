@@ -24,6 +24,7 @@ pub const FILES: &[BuiltinFile] = &[
     ("pads/velostat_ascii.toml", include_bytes!("../../graphs/pads/velostat_ascii.toml")),
     ("pads/velostat_binary.toml", include_bytes!("../../graphs/pads/velostat_binary.toml")),
     ("pads/myrmex_v2.toml", include_bytes!("../../graphs/pads/myrmex_v2.toml")),
+    ("programs/wave_pad.node.toml", include_bytes!("../python/examples/wave_pad.node.toml")),
     ("look.toml", include_bytes!("../../graphs/look.toml")),
     ("parts/touch.toml", include_bytes!("../../graphs/parts/touch.toml")),
     ("parts/ruler.toml", include_bytes!("../../graphs/parts/ruler.toml")),

@@ -76,6 +76,8 @@ fn edge() -> Catalogue {
         .device::<devices::agni::Agni>()
         .device::<devices::lwr_fri::LwrFri>()
         .device::<devices::ur::Ur>();
+    #[cfg(feature = "process")]
+    let catalogue = catalogue.device::<devices::process::Process>();
     #[cfg(feature = "cli")]
     let catalogue = catalogue.lint(tool::lint);
     catalogue

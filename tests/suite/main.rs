@@ -68,6 +68,7 @@ mod plot;
 mod points;
 mod policies;
 mod poor_controllers;
+mod processes;
 mod quantities;
 mod rates;
 mod record;

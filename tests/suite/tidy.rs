@@ -143,6 +143,11 @@ fn only_the_edge_names_tokio() {
         "nodes/src/devices/ur/rtde.rs",
         "nodes/src/devices/ur/session.rs",
         "nodes/src/devices/lwr_fri/driver.rs",
+        "nodes/src/devices/process/child.rs",
+        "nodes/src/devices/process/live.rs",
+        "nodes/src/devices/process/pad.rs",
+        "nodes/src/devices/process/session.rs",
+        "nodes/src/devices/process/stepped.rs",
         "nodes/src/devices/stream/driver.rs",
         "nodes/src/tool/sniff.rs",
     ];

@@ -14,6 +14,8 @@ pub mod mock_arm;
 pub mod mock_force;
 pub mod mock_pad;
 pub(crate) mod pad;
+#[cfg(feature = "process")]
+pub mod process;
 pub mod recording;
 #[cfg(feature = "drivers")]
 pub mod start;

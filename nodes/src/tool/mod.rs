@@ -13,6 +13,8 @@ mod new;
 mod pads;
 mod pose;
 mod press;
+#[cfg(feature = "process")]
+mod signature;
 #[cfg(feature = "drivers")]
 mod sniff;
 mod teach;
@@ -37,5 +39,7 @@ pub fn tool(catalogue: Catalogue) -> Tool {
         .command(derived(tune::run));
     #[cfg(feature = "drivers")]
     let tool = tool.command(derived(pads::run)).command(derived(sniff::run));
+    #[cfg(feature = "process")]
+    let tool = tool.command(derived(signature::run));
     tool
 }

@@ -225,6 +225,11 @@ impl Fill<'_> {
         Report::at(self.add(|description| &mut description.reports, name, T::Shape::default().into()))
     }
 
+    /// States a report whose kind is known only at run time.
+    pub fn report_of(&mut self, name: impl Into<Name>, kind: Kind) -> AnyReport {
+        AnyReport(self.add(|description| &mut description.reports, name, kind.default_shape()))
+    }
+
     /// States a fact, which a graph file may use: `threshold = { from = "pad.threshold" }`.
     pub fn fact(&mut self, name: impl Into<Name>, value: impl Into<toml::Value>) {
         self.description.fills[self.index].facts.push((name.into(), value.into()));
@@ -260,6 +265,10 @@ impl Fill<'_> {
 /// A command port of a device.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Command(pub(crate) usize);
+
+/// A report port of a device whose kind is known only at run time.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct AnyReport(pub(crate) usize);
 
 macro_rules! handles {
     ($($(#[$doc:meta])* $name:ident)*) => { $(

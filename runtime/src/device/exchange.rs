@@ -1,8 +1,9 @@
 //! What a device and a graph exchange: samples one way, commands and reports the other.
 
 use std::borrow::Cow;
+use std::sync::Arc;
 
-use super::{ClockReading, Command, Description, Output, Report};
+use super::{AnyReport, ClockReading, Command, Description, Output, Report};
 use crate::signal::{Arenas, Kind, Shape, Signal};
 
 /// The newest sample of each output of a device, and the counts of the device.
@@ -168,6 +169,8 @@ pub struct Commands {
     pub(crate) grant: Grant,
     arenas: Arenas,
     reports: Vec<ReportValue>,
+    /// The shape of each report, or that of the value that is wired to it.
+    shapes: Arc<[Shape]>,
 }
 
 /// A value that is reported to a device.
@@ -175,7 +178,18 @@ pub struct Commands {
 struct ReportValue {
     kind: Kind,
     slot: u32,
-    is_present: bool,
+    age: ReportAge,
+}
+
+/// Whether a report is there, of which time it is, and how often it was new.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub struct ReportAge {
+    /// Whether it has a value.
+    pub is_present: bool,
+    /// Time of the sample that it was computed from [ns]; `i64::MAX` if it was computed from none.
+    pub stamp: i64,
+    /// How often it was new.
+    pub count: u64,
 }
 
 impl Commands {
@@ -193,14 +207,13 @@ impl Commands {
             other => unreachable!("a command is a joint vector, and not {}", other.kind().with_article()),
         };
         let mut arenas = Arenas::default();
-        let room = |(i, port): (usize, &super::StatedPort)| ReportValue {
-            kind: port.shape.kind(),
-            slot: arenas.add(wired(i).unwrap_or(&port.shape)),
-            is_present: false,
-        };
-        let reports = description.reports.iter().enumerate().map(room).collect();
+        let stated = description.reports.iter().enumerate();
+        let shapes: Arc<[Shape]> = stated.map(|(i, port)| wired(i).unwrap_or(&port.shape).clone()).collect();
+        let room =
+            |shape: &Shape| ReportValue { kind: shape.kind(), slot: arenas.add(shape), age: ReportAge::default() };
+        let reports = shapes.iter().map(room).collect();
         let values = description.commands.iter().map(|port| zeros(&port.shape)).collect();
-        Self { values, grant: Grant::default(), reports, arenas }
+        Self { values, grant: Grant::default(), reports, arenas, shapes }
     }
 
     /// Returns the command of a port, one value per joint.
@@ -221,20 +234,45 @@ impl Commands {
     #[must_use]
     pub fn report<T: Signal>(&self, port: Report<T>) -> Option<&T> {
         let report = self.reports[port.port];
-        report.is_present.then(|| &T::arena(&self.arenas)[report.slot as usize])
+        report.age.is_present.then(|| &T::arena(&self.arenas)[report.slot as usize])
+    }
+
+    /// Returns the shape of a report of any kind: that of the value that is wired to it.
+    #[must_use]
+    pub fn report_shape(&self, port: AnyReport) -> &Shape {
+        &self.shapes[port.0]
+    }
+
+    /// Returns whether a report of any kind is there, of which time, and how often it was new.
+    #[must_use]
+    pub fn report_age(&self, port: AnyReport) -> ReportAge {
+        self.reports[port.0].age
+    }
+
+    /// Appends the bytes of a report of any kind, as in a recording.
+    pub fn report_bytes(&self, port: AnyReport, out: &mut Vec<u8>) {
+        let report = self.reports[port.0];
+        self.arenas.write_bytes(report.kind, report.slot, out);
     }
 
     /// Sets the report to a port, as a graph does.
     pub fn set_report<T: Signal>(&mut self, port: Report<T>, value: &T) {
         let report = &mut self.reports[port.port];
-        report.is_present = true;
+        report.age = ReportAge { is_present: true, stamp: i64::MAX, count: report.age.count + 1 };
         value.copy_to(&mut T::arena_mut(&mut self.arenas)[report.slot as usize]);
     }
 
-    /// Copies the report to `port` from a slot of `arenas`, or makes it absent.
-    pub(crate) fn take_report(&mut self, port: usize, arenas: &Arenas, slot: Option<u32>) {
+    /// Copies the report to `port` from a slot of `arenas`, or makes it absent. `is_new`: whether its value has changed.
+    pub(crate) fn take_report(
+        &mut self,
+        port: usize,
+        arenas: &Arenas,
+        slot: Option<u32>,
+        (stamp, is_new): (i64, bool),
+    ) {
         let report = &mut self.reports[port];
-        report.is_present = slot.is_some();
+        let count = report.age.count + u64::from(is_new);
+        report.age = ReportAge { is_present: slot.is_some(), stamp, count };
         if let Some(slot) = slot {
             arenas.copy(report.kind, slot, &mut self.arenas, report.slot);
         }
@@ -247,7 +285,7 @@ impl Commands {
 
     /// Makes every report absent.
     pub(crate) fn clear_reports(&mut self) {
-        self.reports.iter_mut().for_each(|report| report.is_present = false);
+        self.reports.iter_mut().for_each(|report| report.age.is_present = false);
     }
 
     /// Copies commands and reports of the same device, in place.
@@ -262,7 +300,9 @@ impl Commands {
     /// Copies the reports to the same device, in place.
     pub(crate) fn copy_reports(&mut self, other: &Self) {
         for (port, report) in other.reports.iter().enumerate() {
-            self.take_report(port, &other.arenas, report.is_present.then_some(report.slot));
+            let ReportAge { is_present, stamp, .. } = report.age;
+            self.take_report(port, &other.arenas, is_present.then_some(report.slot), (stamp, false));
+            self.reports[port].age.count = report.age.count;
         }
     }
 

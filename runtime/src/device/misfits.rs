@@ -41,10 +41,11 @@ fn misfit(sort: &str, port: &StatedPort, declared: &[PortSpec]) -> Option<String
     }
     if let Shape::Image(ImageShape { rows, cols, .. }) = &port.shape
         && rows * cols == 0
+        // Of a report only the kind is known.
+        && sort != "report"
     {
         return Some(format!("is an image of {rows} by {cols}, which has no tactels"));
     }
-    // Of a report only the kind is known.
     match (unit_pattern(spec), port.shape.unit()) {
         (Some(UnitPattern::Known(takes)), Some(has)) if takes != has && sort != "report" => {
             Some(format!("is in `{has}`, but the role declares `{takes}`"))

@@ -27,8 +27,8 @@ use crate::source::Value;
 pub use attached::Attached;
 pub use clock::ClockReading;
 pub(crate) use description::StatedPort;
-pub use description::{Command, Description, Fill, Output, Report};
-pub use exchange::{Commands, Samples};
+pub use description::{AnyReport, Command, Description, Fill, Output, Report};
+pub use exchange::{Commands, ReportAge, Samples};
 pub(crate) use exchange::{PortSample, SampleState};
 pub use live::{Link, Live};
 pub(crate) use live::{LinkSetup, Linked, start, wait};
@@ -177,6 +177,13 @@ pub enum Driver {
     Lockstep(Box<dyn Stepped>),
     /// By itself, in real time.
     Live(Box<dyn Live>),
+    /// Step by step in virtual time, and by itself in real time: a program that computes beside the tick.
+    Beside {
+        /// The device in virtual time. A tick waits for it.
+        stepped: Box<dyn Stepped>,
+        /// The device in real time. A tick never waits for it.
+        live: Box<dyn Live>,
+    },
     /// Not at all: a replay writes its samples. `is_live`: whether the device was live when it was recorded.
     Recorded {
         /// Whether it ran in real time.
@@ -213,6 +220,19 @@ pub trait Device: Describe + Sized + 'static {
     /// The parameters in a bench file. They are kept, to open a device once more whose driver has ended with an error.
     type Params: Param + Clone + Send + Sync;
 
+    /// Whether a block of the section `[nodes]` may have this type: a node that computes beside the tick. Its inputs are
+    /// the reports of the role that it [states](Self::role), and its outputs are the outputs of that role.
+    const IS_NODE: bool = false;
+
+    /// Returns the type of role that such a block fills. Its name is that of the role in the description.
+    ///
+    /// # Errors
+    /// The mistakes in the parameters and in the files that they name.
+    fn role(params: &Self::Params) -> Result<RoleType, Mistakes> {
+        let _ = params;
+        unreachable!("only a device that is a node states the type of its role")
+    }
+
     /// Opens the device. A live device connects later, when it runs.
     ///
     /// # Errors
@@ -236,6 +256,16 @@ pub trait DeviceType: Send + Sync {
     }
     /// Returns the parameters in a bench file.
     fn params(&self) -> Vec<ParamSpec>;
+    /// Whether a block of the section `[nodes]` may have this type.
+    fn is_node(&self) -> bool {
+        false
+    }
+    /// Reads the parameters of such a block, and returns the type of the role that it fills. The reader collects the
+    /// mistakes.
+    fn role(&self, table: &Value, reader: &mut Reader<'_>) -> Option<RoleType> {
+        let _ = (table, reader);
+        None
+    }
     /// Reads the parameters and opens the device. The reader collects the mistakes.
     fn open(&self, table: &Value, reader: &mut Reader<'_>) -> Option<Opened>;
 }
@@ -267,13 +297,23 @@ impl<D: Device> DeviceType for TypedDevice<D> {
         D::Params::fields()
     }
 
+    fn is_node(&self) -> bool {
+        D::IS_NODE
+    }
+
+    fn role(&self, table: &Value, reader: &mut Reader<'_>) -> Option<RoleType> {
+        let before = reader.mistakes.len();
+        let params = D::Params::read(table, reader).filter(|_| reader.mistakes.len() == before)?;
+        D::role(&params).map_err(|mistakes| reader.mistakes.extend(mistakes)).ok()
+    }
+
     fn open(&self, table: &Value, reader: &mut Reader<'_>) -> Option<Opened> {
         let before = reader.mistakes.len();
         let params = D::Params::read(table, reader).filter(|_| reader.mistakes.len() == before)?;
         match D::open(params.clone()) {
             Ok(mut opened) => {
                 opened.description.again = Some(Again(Arc::new(move || match D::open(params.clone()).ok()?.driver {
-                    Driver::Live(driver) => Some(driver),
+                    Driver::Live(driver) | Driver::Beside { live: driver, .. } => Some(driver),
                     Driver::Stepped(_) | Driver::Lockstep(_) | Driver::Recorded { .. } => None,
                 })));
                 Some(opened)

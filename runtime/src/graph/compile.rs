@@ -3,7 +3,7 @@
 use std::cell::RefCell;
 
 use crate::catalogue::Catalogue;
-use crate::device::RoleType;
+use crate::device::{RecordedDevice, RoleType};
 use crate::graph::bench::{self, OpenedBench};
 use crate::graph::build::{Builder, BuiltModes, build_modes, find_reach, max_gaps, plan_tasks};
 use crate::graph::check;
@@ -11,7 +11,7 @@ use crate::graph::check::contact::ContactPorts;
 use crate::graph::check::generators::Generators;
 use crate::graph::compiled::Compiled;
 use crate::graph::load::{FlatGraph, Loader, Request};
-use crate::graph::net::{Net, slow_down};
+use crate::graph::net::{Net, role_types, slow_down};
 use crate::graph::outline::OutlineBuilder;
 use crate::graph::plan::{AllowedWarning, Plan, PlannedCommand, PlannedMode, PlannedNode, PortRef, RecordedPorts};
 use crate::graph::syntax::RecordTable;
@@ -35,9 +35,15 @@ fn joined_roles(catalogue: &Catalogue) -> Vec<(String, String)> {
     catalogue.roles().iter().filter_map(joined).collect()
 }
 
+/// Returns the types of nodes that compute beside the tick.
+fn types_beside(catalogue: &Catalogue) -> Vec<String> {
+    let nodes = catalogue.devices().iter().filter(|device| device.is_node());
+    nodes.map(|device| device.name().into_owned()).collect()
+}
+
 /// Compiles a graph with a loader that may have read other files before.
 pub(crate) fn compile_in(mut loader: Loader, catalogue: &Catalogue, request: &Request) -> Result<Compiled, Report> {
-    loader.joined = joined_roles(catalogue);
+    (loader.joined, loader.beside) = (joined_roles(catalogue), types_beside(catalogue));
     let mut flat = loader.load(request);
     let Loader { mut sources, mut diagnostics, mut measured, has_wrong_roles, .. } = loader;
     if has_wrong_roles || has_unreadable(&diagnostics) {
@@ -48,10 +54,10 @@ pub(crate) fn compile_in(mut loader: Loader, catalogue: &Catalogue, request: &Re
         bench::add_models(bench, catalogue, &mut diagnostics);
     }
     let slow = request.slow.unwrap_or(1.0);
-    let recorded = request.recorded.as_ref().map(|recorded| recorded.devices.as_slice());
     slow_down(&mut flat.limits, slow);
-    let net = Net::new(&flat, catalogue, &mut diagnostics);
-    let opened = bench::open(&net, (slow, recorded), &mut sources, &mut diagnostics);
+    let beside = role_types(&flat, catalogue, &mut sources);
+    let net = Net::new(&flat, catalogue, &beside, &mut diagnostics);
+    let opened = bench::open(&net, (slow, recorded_devices(request)), &mut sources, &mut diagnostics);
     check_wires(&net, &opened, &mut diagnostics);
     let view = check::view::check(&net, &mut diagnostics);
     let mut frames = check::frames::check(&net, &mut diagnostics);
@@ -110,6 +116,11 @@ pub(crate) fn compile_in(mut loader: Loader, catalogue: &Catalogue, request: &Re
     with_recorded(all, flat.record.as_ref())
 }
 
+/// Returns the devices of a recording, if the request names one.
+fn recorded_devices(request: &Request) -> Option<&[RecordedDevice]> {
+    request.recorded.as_ref().map(|recorded| recorded.devices.as_slice())
+}
+
 /// Whether a file is not TOML, cannot be read or is of the wrong sort.
 fn has_unreadable(diagnostics: &Diagnostics) -> bool {
     let is_unreadable =
@@ -129,6 +140,7 @@ fn with_recorded(mut compiled: Compiled, table: Option<&RecordTable>) -> Result<
 fn check_wires(net: &Net<'_>, opened: &OpenedBench, diagnostics: &mut Diagnostics) {
     check::silence::check(opened, diagnostics);
     check::inputs::check(net, diagnostics);
+    check::beside::check(net, diagnostics);
     check::commands::check(net, diagnostics);
     check::exports::check(net, diagnostics);
     check::delays::check(net, diagnostics);

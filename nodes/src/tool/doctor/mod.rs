@@ -125,7 +125,7 @@ pub(super) fn run(args: DoctorArgs, shell: &Shell) -> Result<u8, u8> {
                 Ok(patient) => patients.push(patient),
                 Err(error) => worst = worst.max(print(shell, &title, &[Finding::problem(error.to_string())])),
             },
-            Driver::Stepped(_) | Driver::Lockstep(_) | Driver::Recorded { .. } => {
+            Driver::Stepped(_) | Driver::Lockstep(_) | Driver::Beside { .. } | Driver::Recorded { .. } => {
                 let text = "it runs step by step with the graph, so there is nothing to measure";
                 worst = worst.max(print(shell, &title, &[Finding::fine(text)]));
             }

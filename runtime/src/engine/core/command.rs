@@ -83,7 +83,13 @@ impl ReportSlot {
     pub(crate) fn commit(&self, bus: &Bus, commands: &mut Commands, tick: &Tick) {
         let mark = bus.mark(self.source);
         let is_fresh = mark.is_present() && mark.stamp().age(tick.now) <= self.max_age;
-        commands.take_report(self.report, &bus.arenas, is_fresh.then_some(self.source.slot));
+        let is_new = is_fresh && mark.changed_in(tick.index);
+        commands.take_report(
+            self.report,
+            &bus.arenas,
+            is_fresh.then_some(self.source.slot),
+            (mark.stamp().nanos, is_new),
+        );
     }
 }
 

@@ -12,6 +12,10 @@ pub(crate) struct DeviceSlot {
     pub(crate) samples: Samples,
     pub(crate) commands: Commands,
     pub(crate) link: DeviceLink,
+    /// Whether it computes beside the tick: in virtual time a tick waits for it, and in real time none does.
+    pub(crate) is_beside: bool,
+    /// Its driver in real time, until a run starts it.
+    pub(crate) in_real_time: Option<Box<dyn Live>>,
     /// Why the device failed, if it has.
     pub(crate) failed: Option<String>,
     /// How long a driver that ends with an error waits before it is started again.

@@ -36,7 +36,8 @@ impl BusPorts {
             for (port, planned) in role.ports.iter().enumerate() {
                 let id = ports.add(PortRef { producer: Producer::Role(i), port }, planned);
                 let driver = &plan.devices[role.device].driver;
-                let is_live = matches!(driver, Driver::Live(_) | Driver::Recorded { is_live: true });
+                let is_live =
+                    matches!(driver, Driver::Live(_) | Driver::Beside { .. } | Driver::Recorded { is_live: true });
                 let mut inlet = Inlet::new(i, role, port, id, is_live);
                 if plan.devices[role.device].description.may_return {
                     inlet.returns = behind(plan, PortRef { producer: Producer::Role(i), port }, planned);
@@ -254,17 +255,21 @@ fn device_slot(
     sources: &SourceMap,
 ) -> DeviceSlot {
     let wired = |report: usize| reports.get(&(i, report)).copied();
+    let (link, in_real_time) = match device.driver {
+        Driver::Stepped(driver) | Driver::Lockstep(driver) => (DeviceLink::Stepped(driver), None),
+        Driver::Beside { stepped, live } => (DeviceLink::Stepped(stepped), Some(live)),
+        Driver::Live(driver) => (DeviceLink::Idle(driver), None),
+        Driver::Recorded { is_live } => (DeviceLink::Recorded { is_live }, None),
+    };
     DeviceSlot {
         place: sources.locate(device.span.start),
         name: device.name,
         samples: Samples::of(&device.description),
         commands: Commands::with_reports(&device.description, wired),
         description: device.description,
-        link: match device.driver {
-            Driver::Stepped(driver) | Driver::Lockstep(driver) => DeviceLink::Stepped(driver),
-            Driver::Live(driver) => DeviceLink::Idle(driver),
-            Driver::Recorded { is_live } => DeviceLink::Recorded { is_live },
-        },
+        link,
+        is_beside: in_real_time.is_some(),
+        in_real_time,
         failed: None,
         pause: DeviceSlot::FIRST_PAUSE,
         writes_at_start: 0,

@@ -23,6 +23,15 @@ impl Engine {
         Ok(())
     }
 
+    /// Lets the devices that compute beside the tick run by themselves: in real time, no tick waits for them.
+    pub(super) fn leave_lockstep(&mut self) {
+        for device in &mut self.devices {
+            if let Some(driver) = device.in_real_time.take() {
+                device.link = DeviceLink::Idle(driver);
+            }
+        }
+    }
+
     /// Opens each device once more whose pause after an error is over. It is as at the start of the run, and its commands
     /// wait for `resume` if it moves something.
     pub(super) fn restart_drivers(&mut self, epoch: Instant) {

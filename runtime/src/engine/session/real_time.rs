@@ -59,6 +59,9 @@ impl RealTimePacer {
                 driver.watch(interrupt.flag());
             }
         }
+        if is_real {
+            engine.leave_lockstep();
+        }
         let epoch = Instant::now();
         engine.start_drivers(epoch)?;
         let (has_refused, is_silent) = (false, false);

@@ -44,7 +44,7 @@ impl Engine {
     pub fn recorded_devices(&self) -> Vec<RecordedDevice> {
         let is_live = |device: &DeviceSlot| match device.link {
             DeviceLink::Idle(_) | DeviceLink::Live(_) | DeviceLink::Down(_) => true,
-            DeviceLink::Stepped(_) | DeviceLink::Gone => false,
+            DeviceLink::Stepped(_) | DeviceLink::Gone => device.is_beside,
             DeviceLink::Recorded { is_live } => is_live,
         };
         let device = |device: &DeviceSlot| RecordedDevice::of(&device.name, &device.description, is_live(device));

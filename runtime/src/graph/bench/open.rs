@@ -7,8 +7,8 @@ use super::place::place_mistakes;
 use super::reconnect::allow_return;
 use super::sides;
 use crate::catalogue::Catalogue;
-use crate::device::{Description, RecordedDevice, StatedPort};
-use crate::graph::load::MeasuredValues;
+use crate::device::{Description, RecordedDevice, RoleType, StatedPort};
+use crate::graph::load::{MeasuredValues, role_type_of};
 use crate::graph::net::Net;
 use crate::graph::plan::PlannedDevice;
 use crate::graph::syntax::{BenchDocument, Binding, Block};
@@ -78,6 +78,7 @@ pub(crate) fn open(
     let bench = net.flat.bench.as_ref();
     let mut opener = Opener::new(net.catalogue, bench, slow, sources, diagnostics);
     opener.recorded = recorded;
+    opener.net = Some(net);
     opener.kinds = net.flat.roles.iter().map(|(key, kind)| (key.name.clone(), kind.value.clone())).collect();
     let is_bound = |role: &&String| bench.is_none_or(|bench| bench.bind.position(role).is_some());
     opener.unbound = opener.kinds.keys().filter(|role| !is_bound(role)).cloned().collect();
@@ -93,6 +94,12 @@ pub(crate) fn open(
     for (i, (key, kind)) in net.flat.roles.iter().enumerate() {
         let role = match bench {
             Some(bench) if net.roles[i].is_some() => opener.role(bench, key, kind),
+            // A node that computes beside the tick, and has a mistake.
+            Some(bench) if kind.value.contains(' ') => {
+                let binding = bench.bind.get(&key.name).map(Binding::device_word);
+                binding.and_then(|word| opener.device(bench, &word));
+                None
+            }
             _ => None,
         };
         opener.opened.roles.push(role);
@@ -126,6 +133,8 @@ pub(super) struct Opener<'a> {
     unbound: Vec<String>,
     /// Fraction of the speeds of joints that is used.
     slow: f64,
+    /// The graph whose roles the devices fill; `None` for a bench without a task.
+    net: Option<&'a Net<'a>>,
     /// The devices of a recording, which replace those of the bench.
     recorded: Option<&'a [RecordedDevice]>,
     pub(super) opened: OpenedBench,
@@ -151,6 +160,7 @@ impl<'a> Opener<'a> {
             kinds: BTreeMap::new(),
             unbound: Vec::new(),
             slow,
+            net: None,
             recorded: None,
             opened: OpenedBench::default(),
         }
@@ -218,7 +228,7 @@ impl<'a> Opener<'a> {
         let fills = fills.ok()?;
         self.taken.insert((device, fills), key.name.clone());
         let description = &self.opened.devices[device].description;
-        let role = self.catalogue.role_type(&kind.value)?;
+        let role = self.role_type(&kind.value)?;
         let number = |stated: &[StatedPort], declared: &[PortSpec]| {
             let port = |spec: &PortSpec| stated.iter().position(|port| port.fill == fills && port.name == spec.name);
             let port = |spec: &PortSpec| port(spec).map(|port| (port, stated[port].shape.clone()));
@@ -308,9 +318,14 @@ impl<'a> Opener<'a> {
         .help(help)
     }
 
+    /// Returns a type of role by its name.
+    fn role_type(&self, name: &str) -> Option<&'a RoleType> {
+        self.net.map_or_else(|| self.catalogue.role_type(name), |net| net.role_type(name))
+    }
+
     /// Returns whether a device that fills roles of the type `filled` can fill one of the type `kind`.
     fn can_fill(&self, filled: &str, kind: &str) -> bool {
-        self.catalogue.role_type(kind).is_some_and(|role| role.is_filled_by(filled))
+        self.role_type(kind).is_some_and(|role| role.is_filled_by(filled))
     }
 
     /// Returns the binding of a role to a device that can fill it: to one with the name of the role, or to the first that
@@ -382,6 +397,7 @@ impl<'a> Opener<'a> {
         let found = mistakes.into_iter().chain(warnings).collect();
         place_mistakes(found, &block.params, &[], self.sources, self.diagnostics);
         let crate::device::Opened { mut description, driver } = opened?;
+        self.name_own_role(block, &mut description);
         let period = description.period;
         if !PERIOD_RANGE_S.contains(&period) {
             let message = format!("device `{}` has a sample period of {period:e} s", word.value);
@@ -399,6 +415,15 @@ impl<'a> Opener<'a> {
         Some(self.opened.devices.len() - 1)
     }
 
+    /// Gives the role of a node that computes beside the tick the name that it has in this graph.
+    fn name_own_role(&self, block: &Block, description: &mut Description) {
+        let kind = block.kind.as_ref().map_or("", |kind| &*kind.value);
+        let name = role_type_of(kind, &block.key.name);
+        if self.role_type(&name).is_some() {
+            description.fills.iter_mut().for_each(|fill| fill.role = name.clone().into());
+        }
+    }
+
     /// Reports where the ports of a device differ from those of its roles, and adds the reports that it does not read.
     pub(super) fn check_ports(&mut self, description: &mut Description, block: &Block) -> bool {
         let before = self.diagnostics.len();
@@ -412,7 +437,7 @@ impl<'a> Opener<'a> {
         self.diagnostics.extend(indistinct.map(|what| wrong(format!("device `{device}` {what}"))));
         for fill in 0..description.fills.len() {
             let name = description.fills[fill].role.clone();
-            let message = match self.catalogue.role_type(&name) {
+            let message = match self.role_type(&name) {
                 Some(role) => {
                     let misfits = description.misfits(fill, role);
                     description.add_optional_ports(fill, role);

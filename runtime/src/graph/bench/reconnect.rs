@@ -8,7 +8,7 @@ use crate::source::{Code, Diagnostic};
 pub(super) fn allow_return(block: &Block, driver: &Driver, description: &mut Description) -> Option<Diagnostic> {
     let word = block.reconnect.as_ref().filter(|word| word.value)?;
     description.may_return = true;
-    if matches!(driver, Driver::Live(_)) {
+    if matches!(driver, Driver::Live(_) | Driver::Beside { .. }) {
         return None;
     }
     let message = format!("`{}` runs with the graph, so it cannot be lost and come back", block.key.name);

@@ -3,6 +3,7 @@
 pub(crate) mod absent;
 pub(crate) mod allow;
 pub(crate) mod approach;
+pub(crate) mod beside;
 pub(crate) mod calibration;
 mod carried;
 pub(crate) mod clock;

@@ -27,6 +27,8 @@ pub(crate) struct Loader {
     pub(crate) has_wrong_roles: bool,
     /// The roles that a bench adds to every task, each with its type.
     pub(crate) joined: Vec<(String, String)>,
+    /// The types of nodes that compute beside the tick.
+    pub(crate) beside: Vec<String>,
 }
 
 impl Loader {
@@ -84,6 +86,7 @@ impl Loader {
             let role = key.map(|key| (key.clone(), Spanned { value: kind.clone(), span: key.span }));
             role.into_iter().for_each(|(key, kind)| document.roles.push(key, kind));
         }
+        self.move_beside(&mut document, flat.bench.as_mut());
         flat.roles.clone_from(&document.roles);
         self.add_task(&document, task, &Scope::default(), &mut flat);
         self.flatten(document, "", Scope::default(), &mut flat);

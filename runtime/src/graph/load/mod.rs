@@ -1,5 +1,6 @@
 //! From files to one flat graph: parts are expanded, `--set` and overrides are merged.
 
+mod beside;
 mod flat;
 mod loader;
 mod measured;
@@ -9,6 +10,7 @@ mod task;
 mod task_roles;
 mod tasks;
 
+pub(crate) use beside::role_type_of;
 pub(crate) use flat::{Entity, FlatGraph, FlatNode, Scope};
 pub(crate) use loader::{Loader, wrong_file_type};
 pub(crate) use measured::MeasuredValues;

@@ -112,6 +112,7 @@ impl Loader {
         ignore_bench(&mut root);
         let strange = override_with(&mut root, &part.set);
         let mut document = self.sections(|sections| sections.part(&root));
+        self.refuse_beside(&mut document);
         let wires: Vec<&Key> = part.wires.valid.iter().map(|wire| &wire.key).collect();
         if let Some(mistake) = wrong_part(&document, file, &wires, reads).filter(|_| !is_task) {
             self.diagnostics.push(mistake);

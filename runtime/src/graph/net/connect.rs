@@ -116,7 +116,8 @@ impl Net<'_> {
         let name = self.name(Producer::Role(role));
         let ports = commands.iter().map(|port| (false, port)).chain(reports.iter().map(|port| (true, port)));
         let Some((place, (is_report, port))) = ports.enumerate().find(|(_, (_, port))| port.name == key.name) else {
-            let message = format!("`{name}` has no command `{}`", key.name);
+            let what = if self.is_beside(role) { "input" } else { "command" };
+            let message = format!("`{name}` has no {what} `{}`", key.name);
             // A command that has a wire is not what was meant.
             let wires = self.flat.commands.iter().filter(|entry| entry.role.name == name);
             let is_open = |port: &&str| !wires.clone().any(|entry| entry.wire.key.name == *port);
@@ -124,7 +125,7 @@ impl Net<'_> {
             let diagnostic = Diagnostic::new(Code::UnknownInput, key.span.clone(), message);
             diagnostics.push(match suggest_name(&key.name, known().filter(is_open)) {
                 Some(best) => diagnostic.instead(&key.name, best),
-                None => diagnostic.help(format!("commands here: {}", quoted(known()))),
+                None => diagnostic.help(format!("{what}s here: {}", quoted(known()))),
             });
             return None;
         };

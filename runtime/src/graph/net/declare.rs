@@ -16,8 +16,19 @@ use crate::source::{Code, Diagnostic, Diagnostics, Key};
 
 impl<'a> Net<'a> {
     /// Creates a net with all types looked up and without wires.
-    pub(super) fn declare(flat: &'a FlatGraph, catalogue: &'a Catalogue, diagnostics: &mut Diagnostics) -> Self {
-        let roles: Vec<_> = flat.roles.iter().map(|(_, kind)| find_role(kind, catalogue, diagnostics)).collect();
+    pub(super) fn declare(
+        flat: &'a FlatGraph,
+        catalogue: &'a Catalogue,
+        beside: &'a [RoleType],
+        diagnostics: &mut Diagnostics,
+    ) -> Self {
+        let find = |(key, kind): &(Key, Spanned<String>)| match beside.iter().find(|role| role.name == kind.value) {
+            Some(role) => Some(role),
+            // One that has a mistake reports it when its device is opened.
+            None if is_beside(&key.name, kind) => None,
+            None => find_role(kind, catalogue, diagnostics),
+        };
+        let roles: Vec<_> = flat.roles.iter().map(find).collect();
         let nodes = flat.nodes.iter().enumerate().map(|(index, node)| {
             let kind = node.block.kind.as_ref()?;
             let known = catalogue.find_node(&kind.value);
@@ -46,6 +57,7 @@ impl<'a> Net<'a> {
         Self {
             flat,
             catalogue,
+            beside,
             roles,
             nodes,
             observed,
@@ -59,6 +71,11 @@ impl<'a> Net<'a> {
             scope_ports,
         }
     }
+}
+
+/// Whether a role is a node that computes beside the tick.
+fn is_beside(role: &str, kind: &Spanned<String>) -> bool {
+    kind.value.strip_suffix(role).is_some_and(|kind| kind.ends_with(' '))
 }
 
 /// Returns the type of a role, or reports that there is none or that a task cannot declare it.

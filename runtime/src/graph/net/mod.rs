@@ -1,5 +1,6 @@
 //! The net of a flat graph: declarations, wires, and the order in which the nodes step.
 
+mod beside;
 mod connect;
 mod declare;
 pub(crate) mod limits;
@@ -25,6 +26,7 @@ use crate::graph::syntax::NO_ARM;
 use crate::node::{NodeSpec, PortSpec, frame_args};
 use crate::source::{Code, Diagnostic, Diagnostics, Key, Value};
 
+pub(crate) use beside::role_types;
 use provenance::Provenance;
 use scope_ports::ScopePorts;
 pub(crate) use slow::slow_down;
@@ -43,6 +45,8 @@ pub(crate) fn report<T>(resolved: Resolved<T>, diagnostics: &mut Diagnostics) ->
 pub(crate) struct Net<'a> {
     pub(crate) flat: &'a FlatGraph,
     pub(crate) catalogue: &'a Catalogue,
+    /// The types of the roles of nodes that compute beside the tick.
+    beside: &'a [RoleType],
     /// The type of each role; `None` if it is unknown.
     pub(crate) roles: Vec<Option<&'a RoleType>>,
     /// Index of each node's type in the catalogue, and its declaration; `None` if it is unknown.
@@ -68,8 +72,13 @@ pub(crate) struct Net<'a> {
 
 impl<'a> Net<'a> {
     /// Looks up all types, connects all wires and orders the nodes.
-    pub(crate) fn new(flat: &'a FlatGraph, catalogue: &'a Catalogue, diagnostics: &mut Diagnostics) -> Self {
-        let mut net = Self::declare(flat, catalogue, diagnostics);
+    pub(crate) fn new(
+        flat: &'a FlatGraph,
+        catalogue: &'a Catalogue,
+        beside: &'a [RoleType],
+        diagnostics: &mut Diagnostics,
+    ) -> Self {
+        let mut net = Self::declare(flat, catalogue, beside, diagnostics);
         net.wires = net.connect(diagnostics);
         net.commands = net.connect_commands(diagnostics);
         net.order = net.find_order(diagnostics);
@@ -154,6 +163,16 @@ impl<'a> Net<'a> {
     /// Returns the roles whose samples a producer descends from.
     pub(crate) fn roles_of(&self, producer: Producer) -> impl Iterator<Item = usize> {
         self.provenance.roles(producer)
+    }
+
+    /// Returns a type of role by its name.
+    pub(crate) fn role_type(&self, name: &str) -> Option<&'a RoleType> {
+        self.catalogue.role_type(name).or_else(|| self.beside.iter().find(|role| role.name == name))
+    }
+
+    /// Returns whether a role is a node that computes beside the tick.
+    pub(crate) fn is_beside(&self, role: usize) -> bool {
+        self.beside.iter().any(|known| known.name == self.flat.roles[role].1.value)
     }
 
     /// Returns the declaration of a node, or `None` if its type is unknown.

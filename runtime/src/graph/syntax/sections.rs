@@ -181,7 +181,7 @@ pub(crate) struct BenchDocument {
 
 /// Reads sections and collects their diagnostics.
 pub(crate) struct Sections<'a> {
-    pub(super) reader: Reader<'a>,
+    pub(crate) reader: Reader<'a>,
     pub(super) diagnostics: Diagnostics,
     /// Blocks that are not tables and have their own diagnostic.
     broken: Vec<Key>,

@@ -24,6 +24,7 @@ pub(crate) fn inject(compiled: &mut Compiled, injections: &[Injection], seed: u6
         device.driver = match std::mem::replace(&mut device.driver, Driver::Stepped(Box::new(Nothing))) {
             Driver::Stepped(inner) => Driver::Stepped(wrap(inner)),
             Driver::Lockstep(inner) => Driver::Lockstep(wrap(inner)),
+            Driver::Beside { stepped, live } => Driver::Beside { stepped: wrap(stepped), live },
             // A scenario refuses a bench with such a device.
             other @ (Driver::Live(_) | Driver::Recorded { .. }) => other,
         };

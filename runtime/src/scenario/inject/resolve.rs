@@ -113,7 +113,9 @@ fn of_world(table: InjectTable, compiled: &mut Compiled) -> Result<Injection, Bo
     };
     let planned = &mut compiled.plan.devices[device];
     let is_simulated = match &mut planned.driver {
-        Driver::Stepped(driver) | Driver::Lockstep(driver) => driver.disturb(&Disturbance::default()),
+        Driver::Stepped(driver) | Driver::Lockstep(driver) | Driver::Beside { stepped: driver, .. } => {
+            driver.disturb(&Disturbance::default())
+        }
         Driver::Live(_) | Driver::Recorded { .. } => false,
     };
     if !is_simulated {

@@ -1,0 +1,73 @@
+//! A program as a pad: it sends frames by itself.
+
+use std::sync::Arc;
+
+use async_trait::async_trait;
+use tactflow_runtime::device::{DeviceError, Link, Live, Output};
+use tactflow_runtime::signal::Image;
+
+use super::child::Heard;
+use super::launch::Launch;
+use super::session::Session;
+use super::wire::{self, Frame, Value};
+
+/// The stamp of a frame of a program that has no clock of its own.
+const NO_CLOCK: i64 = i64::MIN;
+
+/// A program that is a pad.
+pub(super) struct PadProcess {
+    launch: Arc<Launch>,
+    image: Output<Image>,
+}
+
+impl PadProcess {
+    pub(super) const fn new(launch: Arc<Launch>, image: Output<Image>) -> Self {
+        Self { launch, image }
+    }
+
+    fn publish(&self, frame: &Frame, link: &mut Link) -> Result<(), String> {
+        let values = wire::values(frame, &self.launch.signature)?;
+        let stamp = if frame.stamp == NO_CLOCK { link.arrival() } else { link.stamp_of(frame.stamp) };
+        link.publish(|samples| match &values[..] {
+            [Value::Image(cells)] => {
+                samples.write(self.image, stamp, frame.number).cells_mut().copy_from_slice(cells);
+            }
+            _ => samples.clear(self.image, stamp, frame.number),
+        });
+        Ok(())
+    }
+}
+
+#[async_trait]
+impl Live for PadProcess {
+    async fn run(self: Box<Self>, mut link: Link) -> Result<(), DeviceError> {
+        let stopped = link.stopped();
+        tokio::pin!(stopped);
+        let mut session = tokio::select! {
+            biased;
+            () = &mut stopped => return Ok(()),
+            session = Session::start(&self.launch, Vec::new()) => session?,
+        };
+        loop {
+            let heard = tokio::select! {
+                biased;
+                () = &mut stopped => break,
+                heard = tokio::time::timeout(self.launch.timeout, session.frame()) => heard,
+            };
+            let silent = |_| format!("no frame for {} ms", self.launch.timeout.as_millis());
+            let mut frame = heard.map_err(silent)??;
+            // The newest one: a program that sends too much must not fill the tick with old frames.
+            while let Some(heard) = session.waiting() {
+                link.count("skipped frames");
+                match heard {
+                    Heard::Frame(newer) => frame = newer,
+                    Heard::Broken(why) => return Err(why.into()),
+                    Heard::Line(_) => return Err("it states its signature twice".into()),
+                }
+            }
+            self.publish(&frame, &mut link)?;
+        }
+        session.dismiss();
+        Ok(())
+    }
+}

@@ -1,0 +1,115 @@
+//! The conversation with a program: its signature, the start, and a question with its answer.
+
+use std::collections::BTreeMap;
+use std::path::Path;
+use std::time::Duration;
+
+use serde_json::{Value as Json, json};
+
+use super::child::{Heard, Program};
+use super::launch::Launch;
+use super::signature::{Signature, VERSION};
+use super::wire::{self, Frame, Question, Value};
+
+/// A program whose signature agrees.
+pub(super) struct Session {
+    program: Program,
+    signature: Signature,
+    timeout: Duration,
+}
+
+impl Session {
+    /// Starts a program, compares its signature with the file, and sends it the shapes of its inputs and its parameters.
+    pub(super) async fn start(launch: &Launch, inputs: Vec<Json>) -> Result<Self, String> {
+        let mut program = Program::start(launch)?;
+        let stated = hear_signature(&mut program, launch.start).await?;
+        if let Some(difference) = launch.signature.differs_from(&stated) {
+            let command = launch.command.join(" ");
+            return Err(format!("{difference}: write the file once more with `tactflow signature -- {command}`"));
+        }
+        let start = json!({ "tactflow": VERSION, "inputs": inputs, "params": launch.values });
+        program.send(format!("{start}\n").into_bytes())?;
+        Ok(Self { program, signature: launch.signature.clone(), timeout: launch.timeout })
+    }
+
+    /// Asks a question and waits for its answer.
+    pub(super) async fn ask(&mut self, question: Question) -> Result<Vec<Value>, String> {
+        let (number, stamp) = (question.number, question.stamp);
+        self.program.send(question.frame())?;
+        let frame = match tokio::time::timeout(self.timeout, self.frame()).await {
+            Ok(frame) => frame?,
+            Err(_) => return Err(format!("no answer within {} ms: it hangs", self.timeout.as_millis())),
+        };
+        if (frame.number, frame.stamp) != (number, stamp) {
+            let (theirs, ours) = (frame.number, number);
+            return Err(match theirs == ours {
+                true => format!("its answer {ours} has the stamp {}, and the question had {stamp}", frame.stamp),
+                false => format!("it answers question {theirs}, and {ours} was asked"),
+            });
+        }
+        wire::values(&frame, &self.signature)
+    }
+
+    /// Returns the next frame, as soon as it is there.
+    pub(super) async fn frame(&mut self) -> Result<Frame, String> {
+        match self.program.heard.recv().await {
+            Some(Heard::Frame(frame)) => Ok(frame),
+            Some(Heard::Broken(why)) => Err(why),
+            Some(Heard::Line(_)) => Err("it states its signature twice".to_owned()),
+            None => Err(self.program.epitaph()),
+        }
+    }
+
+    /// Returns a frame that is there already.
+    pub(super) fn waiting(&mut self) -> Option<Heard> {
+        self.program.heard.try_recv().ok()
+    }
+
+    /// Lets the program end by itself.
+    pub(super) fn dismiss(&mut self) {
+        self.program.dismiss();
+    }
+}
+
+async fn hear_signature(program: &mut Program, patience: Duration) -> Result<Signature, String> {
+    let heard = tokio::time::timeout(patience, program.heard.recv()).await;
+    let heard = heard.map_err(|_| format!("it has not stated its signature within {} s", patience.as_secs_f64()))?;
+    match heard {
+        Some(Heard::Line(line)) => Signature::from_line(&line).map_err(|why| {
+            let start: String = line.trim_end().chars().take(60).collect();
+            format!("its first line is no signature: {why} (it begins with `{start}`)")
+        }),
+        Some(Heard::Broken(why)) => Err(why),
+        Some(Heard::Frame(_)) => Err("it sends a frame before its signature".to_owned()),
+        None => Err(program.epitaph()),
+    }
+}
+
+/// Runs a program until it has stated its signature.
+///
+/// # Errors
+/// Why it has not.
+pub(crate) fn ask_signature(command: &[String], folder: &Path, patience: Duration) -> Result<Signature, String> {
+    let nothing = Signature {
+        tactflow: VERSION,
+        name: command.first().cloned().unwrap_or_default(),
+        doc: String::new(),
+        inputs: Vec::new(),
+        outputs: Vec::new(),
+        params: Vec::new(),
+    };
+    let launch = Launch {
+        command: command.to_vec(),
+        folder: folder.to_path_buf(),
+        signature: nothing,
+        values: BTreeMap::new(),
+        timeout: patience,
+        start: patience,
+    };
+    let runtime = tokio::runtime::Builder::new_current_thread().enable_time().build();
+    let runtime = runtime.map_err(|error| error.to_string())?;
+    let mut program = Program::start(&launch)?;
+    let signature = runtime.block_on(hear_signature(&mut program, patience))?;
+    program.dismiss();
+    Ok(signature)
+}

@@ -1,0 +1,284 @@
+//! Programs in other languages, as nodes beside the tick and as pads: docs/processes.md.
+
+use std::fs;
+use std::process::{Command, Stdio};
+use std::thread::sleep;
+use std::time::{Duration, Instant};
+
+use tactflow_runtime::engine::{Engine, RunOptions, run};
+use tactflow_runtime::graph::{Request, compile};
+use tactflow_runtime::signal::Freshness;
+use tactflow_tests::{catalogue, workspace};
+
+use crate::cli::in_new_folder;
+use crate::tool::{Said, said, tool};
+
+const GRAPH: &str = "tests/data/process.toml";
+const HYBRID: &str = "nodes/python/examples/hybrid.toml";
+
+/// The setting that makes the program do one thing wrong at its third question.
+fn program(wrong: &str) -> String {
+    format!(r#"nodes.program.command=["python3", "../peers/broken_program.py", "{wrong}", "3"]"#)
+}
+
+/// The setting with which a Python example finds the package without an installation.
+fn python(block: &str, script: &str) -> String {
+    let package = workspace().join("nodes/python");
+    format!(r#"{block}.command=["env", "PYTHONPATH={}", "python3", "{script}"]"#, package.display())
+}
+
+fn run_with(settings: &[&str], more: &[&str]) -> Said {
+    let mut args = vec!["run", GRAPH];
+    args.extend(settings.iter().flat_map(|setting| ["--set", setting]));
+    args.extend(more);
+    said(&mut tool(&args))
+}
+
+/// Runs a graph in the engine.
+fn observe(request: &Request, options: &RunOptions, see: &mut dyn FnMut(&Engine)) {
+    let compiled = compile(&catalogue(), request).unwrap_or_else(|report| panic!("{}", report.render(false)));
+    let mut engine = Engine::new(compiled);
+    run(&mut engine, options, see).expect("the drivers start");
+}
+
+#[test]
+fn an_answer_is_there_one_tick_later_and_has_the_stamp_of_its_question() {
+    let mut before = None;
+    let mut answers = 0;
+    observe(&Request::file(workspace().join(GRAPH)), &RunOptions::default(), &mut |engine| {
+        if let (Some((sum, stamp)), Some(answer)) = (before, engine.get::<f64>("program.sum")) {
+            let expected: f64 = sum;
+            assert!((answer - expected).abs() < 1e-6, "{answer} for {expected}");
+            assert_eq!(engine.mark("program.sum").stamp().nanos, stamp);
+            answers += 1;
+        }
+        let stamp = engine.mark("source.sum").stamp().nanos;
+        before = engine.get::<f64>("source.sum").map(|sum| (*sum, stamp));
+    });
+    assert_eq!(answers, 149);
+}
+
+#[test]
+fn a_recording_replays_without_the_program() {
+    let (folder, graph) = in_new_folder("process.toml");
+    let copy = |from: &str, to: &str| fs::copy(workspace().join(from), folder.path().join(to)).unwrap();
+    copy(GRAPH, "process.toml");
+    copy("tests/data/broken.node.toml", "broken.node.toml");
+    copy("tests/peers/broken_program.py", "program.py");
+    let command = r#"nodes.program.command=["python3", "program.py", "right", "3"]"#;
+    let recordings = ["a.mcap", "b.mcap"].map(|name| folder.path().join(name).display().to_string());
+    for recording in &recordings {
+        let recorded = said(&mut tool(&["run", &graph, "--set", command, "--record", recording]));
+        assert_eq!((recorded.code, recorded.err.as_str()), (0, ""), "{}", recorded.out);
+    }
+    let [first, second] = &recordings;
+    assert_eq!(fs::read(first).unwrap(), fs::read(second).unwrap(), "two runs are the same");
+    for name in ["program.py", "broken.node.toml"] {
+        fs::remove_file(folder.path().join(name)).unwrap();
+    }
+    let replayed = said(&mut tool(&["replay", first]));
+    assert_eq!(replayed.code, 0, "{}{}", replayed.out, replayed.err);
+    assert!(replayed.out.contains("the same to the last bit"), "{}", replayed.out);
+}
+
+/// What each program does wrong, and what is said of it.
+const BROKEN: [(&str, &str); 18] = [
+    ("crash", "device `program` failed: it ended: exit status: 1; it said `ZeroDivisionError: the mean of nothing`"),
+    ("killed", "it ended: signal: 9 (SIGKILL)"),
+    ("hang", "no answer within 400 ms: it hangs"),
+    ("deaf", "no answer within 400 ms: it hangs"),
+    ("flood", "it answers question 3, and 4 was asked"),
+    ("size", "output `sum`: the frame is too short for it"),
+    ("huge", "it sends a frame of 2147483648 bytes, and a frame of its outputs has at most 9"),
+    ("nan", "`program.sum` is not a finite number"),
+    ("garbage", "it sends bytes that are no frame: 80 81 82 83"),
+    ("print", "it writes text instead of a frame: `x is 0.123456789"),
+    ("number", "it answers question 10, and 3 was asked"),
+    ("stamp", "its answer 3 has the stamp 8000001, and the question had 8000000"),
+    ("half", "it ended in the middle of a frame"),
+    ("version", "it speaks version 2 of the protocol, and this tool speaks version 1"),
+    (
+        "port",
+        "the program has no output `sum`, and the file has one: write the file once more with `tactflow signature",
+    ),
+    ("unit", "the output `sum` is scalar in kPa in the program, and scalar in N in the file"),
+    ("no_module", "it said `ModuleNotFoundError: No module named 'no_such_module'`"),
+    ("chatty", "its first line is no signature"),
+];
+
+#[test]
+fn whatever_a_program_does_wrong_is_named() {
+    for (wrong, why) in BROKEN {
+        let failed = run_with(&[&program(wrong)], &[]);
+        assert_eq!(failed.code, 1, "{wrong}: {}", failed.out);
+        assert!(failed.err.contains(why), "{wrong}: {}", failed.err);
+    }
+    let silent = run_with(&[&program("silent"), "nodes.program.start_s=0.5"], &[]);
+    assert!(silent.err.contains("it has not stated its signature within 0.5 s"), "{}", silent.err);
+    let missing = run_with(&[r#"nodes.program.command=["no_such_program"]"#], &[]);
+    assert!(missing.err.contains("cannot start `no_such_program` in `tests/data`: No such file"), "{}", missing.err);
+}
+
+#[test]
+fn in_real_time_the_policy_decides_and_a_program_is_started_once_more() {
+    let real = ["--realtime", "--for", "1.5s"];
+    let long = "devices.pad.for_s=5.0";
+    for wrong in ["crash", "flood", "print"] {
+        let failed = run_with(&[&program(wrong), long], &real);
+        assert_eq!(failed.code, 1, "{wrong}: {}", failed.out);
+        assert!(failed.err.contains("device `program` failed: it "), "{wrong}: {}", failed.err);
+        let again = run_with(&[&program(wrong), long, "nodes.program.restart=true"], &real);
+        assert_eq!(again.code, 0, "{wrong}: {}", again.err);
+        assert!(again.out.contains(" restarts"), "{wrong}: {}", again.out);
+    }
+    let held = run_with(&[&program("crash"), long, "policy.device=hold"], &real);
+    assert_eq!(held.code, 0, "{}", held.err);
+}
+
+#[cfg(target_os = "linux")]
+#[test]
+fn no_process_stays_behind_however_the_run_ends() {
+    for is_killed in [false, true] {
+        let (folder, file) = in_new_folder("pids");
+        let command =
+            format!(r#"nodes.program.command=["python3", "../peers/broken_program.py", "grandchild", "3", "{file}"]"#);
+        let setting = ["devices.pad.for_s=60.0", &command];
+        let mut args = vec!["run", GRAPH, "--realtime", "--for", if is_killed { "60s" } else { "1s" }];
+        args.extend(setting.iter().flat_map(|setting| ["--set", setting]));
+        let mut run = tool(&args).stdout(Stdio::null()).stderr(Stdio::null()).spawn().unwrap();
+        let pids: Vec<String> = wait_for(|| {
+            let text = fs::read_to_string(&file).ok()?;
+            let pids: Vec<String> = text.split_whitespace().map(str::to_owned).collect();
+            (pids.len() == 2).then_some(pids)
+        });
+        let is_there = |pid: &str| {
+            let stat = fs::read_to_string(format!("/proc/{pid}/stat")).unwrap_or_default();
+            // One that has ended and waits for its parent is not there.
+            stat.rsplit(')').next().is_some_and(|rest| !rest.trim().is_empty() && !rest.trim().starts_with('Z'))
+        };
+        assert!(pids.iter().all(|pid| is_there(pid)), "both run: {pids:?}");
+        if is_killed {
+            run.kill().unwrap();
+        }
+        run.wait().unwrap();
+        wait_for(|| pids.iter().all(|pid| !is_there(pid)).then_some(()));
+        drop(folder);
+    }
+}
+
+/// Waits until something is there.
+fn wait_for<T>(mut get: impl FnMut() -> Option<T>) -> T {
+    let end = Instant::now() + Duration::from_secs(10);
+    loop {
+        match get() {
+            Some(got) => return got,
+            None => assert!(Instant::now() < end, "it does not come"),
+        }
+        sleep(Duration::from_millis(10));
+    }
+}
+
+#[test]
+fn a_check_runs_nothing_and_reports_what_does_not_fit() {
+    let (folder, marker) = in_new_folder("marker");
+    let check = |settings: &[&str]| {
+        let mut args = vec!["check", GRAPH];
+        args.extend(settings.iter().flat_map(|setting| ["--set", setting]));
+        said(&mut tool(&args))
+    };
+    let harmless = check(&[&format!(r#"nodes.program.command=["touch", "{marker}"]"#)]);
+    assert_eq!((harmless.code, harmless.err.as_str()), (0, ""));
+    assert!(!folder.path().join("marker").exists(), "a check must run nothing from a graph");
+    for (setting, why) in [
+        ("nodes.program.signature=no.node.toml", "write it with `tactflow signature -- PROGRAM`"),
+        ("nodes.program.params.gian=2.0", "`broken` has no parameter `gian`"),
+        ("nodes.program.in.imag=source.image", "`program` has no input `imag`"),
+        ("nodes.program.in.image=source.sum", "`source.sum` is a scalar, but `program.image` takes an image"),
+        ("nodes.program.command=[]", "there is no program to run"),
+        ("nodes.program.signature=tests/data/process.toml", "`process.toml` is no signature of a program"),
+        ("graph.clock=program", "`program` computes beside the tick, so it cannot trigger the ticks"),
+        ("nodes.program.threshold=0.1", "`threshold` is for a pad, and `broken` has inputs"),
+        ("nodes.pad.type=process", "the bench has a device or a binding with the name `pad`"),
+    ] {
+        let refused = check(&[setting]);
+        assert_eq!(refused.code, 2, "{setting}: {}", refused.out);
+        assert!(refused.err.contains(why), "{setting}: {}", refused.err);
+    }
+}
+
+#[test]
+fn a_program_is_no_arm() {
+    let (folder, file) = in_new_folder("arm.node.toml");
+    let text = "tactflow = 1\nname = \"arm\"\n[[outputs]]\nname = \"velocity\"\nkind = \"joints\"\n";
+    fs::write(&file, text).unwrap();
+    let bench = folder.path().join("bench.toml");
+    let text =
+        "[bind]\npad = \"p\"\n[devices.p]\ntype = \"process\"\ncommand = [\"true\"]\nsignature = \"arm.node.toml\"\n";
+    fs::write(&bench, text).unwrap();
+    let refused = said(&mut tool(&["check", "graphs/look.toml", "--bench", bench.to_str().unwrap()]));
+    assert_eq!(refused.code, 2, "{}", refused.out);
+    assert!(refused.err.contains("no motion of an arm, because nothing outside of it would stop"), "{}", refused.err);
+}
+
+#[test]
+fn the_hybrid_task_is_as_good_with_its_features_in_python() {
+    let (folder, scenario) = in_new_folder("table3.toml");
+    let text = fs::read_to_string(workspace().join("graphs/scenarios/table3_ball.toml")).unwrap();
+    let root = workspace().display();
+    let text = text.replace("../hybrid.toml", &format!("{root}/{HYBRID}"));
+    let text = text.replace("../benches/", &format!("{root}/graphs/benches/")).replace("seeds = 10", "seeds = 2");
+    fs::write(&scenario, text).unwrap();
+    let package = workspace().join("nodes/python");
+    let verified = said(tool(&["verify", &scenario]).env("PYTHONPATH", package));
+    drop(folder);
+    assert_eq!(verified.code, 0, "{}{}", verified.out, verified.err);
+    println!("{}", verified.out);
+}
+
+#[test]
+fn in_real_time_a_tick_waits_for_no_program_and_its_answers_are_young() {
+    let request = Request::file(workspace().join(HYBRID)).set(python("nodes.contact", "contact.py"));
+    let options = RunOptions { duration: Some(3.0), is_realtime: true, ..RunOptions::default() };
+    let mut ages = Vec::new();
+    observe(&request, &options, &mut |engine| {
+        let mark = engine.mark("contact.x");
+        if mark.freshness(engine.ticks() - 1) == Freshness::New || mark.freshness(engine.ticks()) == Freshness::New {
+            ages.push(mark.stamp().age(engine.now()) as f64 * 1e-6);
+        }
+    });
+    ages.sort_by(f64::total_cmp);
+    let at = |part: f64| ages[(part * (ages.len() - 1) as f64) as usize];
+    println!("added latency: {:.1} ms at the median, {:.1} ms at 99 %, of {} answers", at(0.5), at(0.99), ages.len());
+    assert!(ages.len() > 100 && at(0.5) < 50.0, "{ages:?}");
+}
+
+#[test]
+fn the_python_package_states_runs_and_reads() {
+    let examples = workspace().join("nodes/python/examples");
+    let package = workspace().join("nodes/python");
+    for name in ["contact", "wave_pad"] {
+        let (folder, out) = in_new_folder("stated.node.toml");
+        // It runs in the folder of its signature.
+        fs::copy(examples.join(format!("{name}.py")), folder.path().join("program.py")).unwrap();
+        let mut stated = tool(&["signature", "--out", &out, "--", "python3", "program.py"]);
+        let stated = said(stated.env("PYTHONPATH", &package));
+        assert_eq!((stated.code, stated.err.as_str()), (0, ""), "{}", stated.out);
+        let body = |text: String| text.lines().skip(1).map(str::to_owned).collect::<Vec<_>>();
+        let written = body(fs::read_to_string(&out).unwrap());
+        let shipped = body(fs::read_to_string(examples.join(format!("{name}.node.toml"))).unwrap());
+        assert_eq!(written, shipped, "{name}.node.toml is not what the example states");
+    }
+    let look = ["run", "nodes/python/examples/look.toml", "--for", "1s"];
+    let look = said(tool(&look).env("PYTHONPATH", &package));
+    assert_eq!(look.code, 0, "{}{}", look.out, look.err);
+    assert!(look.out.contains("touch.image: 8x8 tactels"), "{}", look.out);
+    let (folder, recording) = in_new_folder("run.mcap");
+    let recorded = ["run", HYBRID, "--for", "1s", "--record", &recording];
+    let recorded = said(tool(&recorded).env("PYTHONPATH", &package));
+    assert_eq!(recorded.code, 0, "{}", recorded.err);
+    let mut read = Command::new("python3");
+    read.arg(workspace().join("tests/peers/read_recording.py")).arg(&recording).env("PYTHONPATH", &package);
+    let read = said(&mut read);
+    assert_eq!((read.code, read.err.as_str()), (0, ""), "{}", read.out);
+    drop(folder);
+}
