@@ -4,7 +4,7 @@ mod checks;
 mod limit_readers;
 
 use std::collections::BTreeMap;
-use std::sync::OnceLock;
+use std::sync::{Arc, OnceLock};
 
 use crate::device::{Device, DeviceType, RoleType, device_type};
 use crate::node::{Node, NodeSpec, NodeType, of};
@@ -24,7 +24,7 @@ pub type Lint = fn(&Outline, &[(String, toml::Value)]) -> Diagnostics;
 pub struct Catalogue {
     /// The sort of entry behind each name.
     names: BTreeMap<String, &'static str>,
-    nodes: Vec<Box<dyn NodeType>>,
+    nodes: Vec<Arc<dyn NodeType>>,
     /// The declaration of each node type.
     specs: Vec<NodeSpec>,
     /// Titles of groups, each with the number of its first node.
@@ -64,7 +64,12 @@ impl Catalogue {
     /// of one name, or an example that is of another type, sets an unknown parameter or leaves a required input unwired.
     /// The message lists everything that is wrong.
     #[track_caller]
-    pub fn node_type(mut self, node: Box<dyn NodeType>) -> Self {
+    pub fn node_type(self, node: Box<dyn NodeType>) -> Self {
+        self.shared_node_type(node.into())
+    }
+
+    #[track_caller]
+    fn shared_node_type(mut self, node: Arc<dyn NodeType>) -> Self {
         let spec = node.spec();
         self.claim(&spec.name, "node");
         refuse(&checks::node(&spec));
@@ -137,7 +142,7 @@ impl Catalogue {
         self.groups.extend(start.filter(|_| other.groups.first().is_none_or(|(at, _)| *at > 0)));
         self.groups.extend(other.groups.iter().map(|(at, title)| (before + at, *title)));
         for node in other.nodes {
-            self = self.node_type(node);
+            self = self.shared_node_type(node);
         }
         for device in other.devices {
             self = self.device_type(device);
@@ -152,7 +157,7 @@ impl Catalogue {
 
     /// Returns the node types.
     #[must_use]
-    pub fn nodes(&self) -> &[Box<dyn NodeType>] {
+    pub fn nodes(&self) -> &[Arc<dyn NodeType>] {
         &self.nodes
     }
 

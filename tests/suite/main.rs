@@ -13,6 +13,7 @@ mod calibrate_guided;
 mod ceilings;
 #[cfg(unix)]
 mod cell;
+mod changes;
 mod cli;
 mod clocks;
 

@@ -2,12 +2,13 @@
 
 use std::path::Path;
 
-use tactflow_runtime::engine::Engine;
+use tactflow_runtime::catalogue::Catalogue;
+use tactflow_runtime::engine::{Changer, Engine};
 use tactflow_runtime::graph::{Request, compile};
 use tactflow_runtime::record::OutputFile;
 use tactflow_runtime::recording::{RecordRequest, RunRecorder};
 use tactflow_tests::examples::graph_of_all;
-use tactflow_tests::{catalogue, shipped_graphs};
+use tactflow_tests::{catalogue, shipped_graphs, workspace};
 
 /// Every shipped graph, and one of the examples of all nodes: by name, how to load it.
 fn graphs() -> Vec<(String, Request)> {
@@ -53,6 +54,44 @@ fn the_tick_neither_allocates_nor_frees_in_any_shipped_graph() {
     }
 }
 
+/// Moves the first parameter that a graph lists in `[live]` to the end of its range, if it lists one.
+fn change<'c>(engine: &mut Engine, catalogue: &'c Catalogue, request: &Request) -> Option<Changer<'c>> {
+    let (name, max) = engine.live_values().next().map(|live| (live.param.name.clone(), live.param.max))?;
+    let mut changer = Changer::new(engine, request, move |request| compile(catalogue, request).map(drop)).unwrap();
+    changer.set(&name, max).unwrap();
+    changer.prepare().unwrap();
+    Some(changer)
+}
+
+#[test]
+fn a_parameter_changes_without_allocating_or_freeing_in_the_tick() {
+    let (request, catalogue) = (Request::file(workspace().join("graphs/hybrid.toml")), catalogue());
+    let folder = tempfile::tempdir().unwrap();
+    let (mut engine, mut plain) = (engine(&request), engine(&request));
+    let mut recorder = recorder(&mut engine, &request, &folder.path().join("run.mcap"));
+    let mut changer = change(&mut engine, &catalogue, &request).unwrap();
+    let mut changed = 0;
+    while let Some(now) = engine.next().filter(|_| engine.ticks() < 300) {
+        changer.prepare().unwrap();
+        let before = engine.live_values().next().map(|live| live.value);
+        // A device may allocate; that of the other engine does the same.
+        let [changing, still] = [&mut engine, &mut plain].map(|engine| {
+            let counted = allocation_counter::measure(|| engine.exchange(now).unwrap());
+            (counted.count_total, counted.count_current)
+        });
+        assert_eq!(changing, still, "in the exchange of tick {}", engine.ticks());
+        plain.step().unwrap();
+        let counted = allocation_counter::measure(|| {
+            engine.step().unwrap();
+            recorder.record(&engine, || false);
+        });
+        assert_eq!((counted.count_total, counted.count_current), (0, 0), "in tick {}", engine.ticks());
+        changed += u32::from(before != engine.live_values().next().map(|live| live.value));
+    }
+    assert!(changed > 50, "{changed} ticks changed the parameter");
+    assert!(recorder.finish(|_| true).error.is_none());
+}
+
 #[test]
 fn the_counter_counts() {
     let counted = allocation_counter::measure(|| drop(std::hint::black_box(vec![1_u8; 100])));
@@ -94,6 +133,14 @@ fn in_a_jail() {
         (engine, recorder)
     });
     let mut engines: Vec<(Engine, RunRecorder)> = started.collect();
+    // The steps of a change wait in the ring, so that the ticks below take them.
+    let catalogue = catalogue();
+    let changers: Vec<Option<Changer<'_>>> = engines
+        .iter_mut()
+        .zip(graphs())
+        .map(|((engine, _), (_, request))| change(engine, &catalogue, &request))
+        .collect();
+    assert!(changers.iter().any(Option::is_some), "no shipped graph lists a parameter in [live]");
     // Whatever a first panic or a first float would set up lazily is set up by the first tick.
     for (engine, recorder) in &mut engines {
         let now = engine.next().unwrap();

@@ -44,7 +44,7 @@ pub struct FeatureError {
 #[derive(Debug, Clone, Param)]
 pub struct Params {
     /// Target of each feature.
-    #[param(unit = "_", live)]
+    #[param(unit = "_", live, tunable)]
     setpoint: Map<f64>,
     /// Features without which the whole error is absent. Without any other feature, only its own component is absent.
     #[param(default = Vec::new())]

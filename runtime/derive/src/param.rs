@@ -12,7 +12,7 @@ use crate::checks::{LetterKind, bound_letter, inputs_beside, is_unit_letter};
 use crate::docs::text;
 use crate::fault::{Faults, asserted};
 
-const KNOWN: &[&str] = &["unit", "range", "above", "usual", "default", "live", "from_bench", "flatten"];
+const KNOWN: &[&str] = &["unit", "range", "above", "usual", "default", "live", "tunable", "from_bench", "flatten"];
 const KNOWN_OF_TABLE: &[&str] = &["inputs", "default"];
 
 /// One field of a table of parameters.
@@ -27,6 +27,7 @@ struct Parameter {
     usual: Option<(Expr, TokenStream)>,
     default: Option<Expr>,
     is_live: bool,
+    is_tunable: bool,
     is_from_bench: bool,
     /// Whether it is a table whose fields are fields of the table around it.
     is_flat: bool,
@@ -165,6 +166,11 @@ fn parameter(field: Field, faults: &mut Faults) -> Option<Parameter> {
         faults.add(&name, format!("`{name}` needs a doc comment: what it means"));
     }
     let (unit, is_live) = (words.text("unit", faults), words.flag("live", faults).is_some());
+    let tunable = words.flag("tunable", faults);
+    if let Some(tunable) = tunable.as_ref().filter(|_| !is_live) {
+        faults.add(tunable, "`tunable` needs `live`: what changes while the graph runs can differ between modes");
+    }
+    let is_tunable = tunable.is_some();
     let is_from_bench = words.flag("from_bench", faults).is_some();
     let (range, above) = (words.value("range", faults), words.value("above", faults));
     let usual = words.value("usual", faults);
@@ -179,7 +185,19 @@ fn parameter(field: Field, faults: &mut Faults) -> Option<Parameter> {
         (None, None) => None,
     };
     let bounds_at = range.or(above).map(|(_, value)| value);
-    Some(Parameter { field, name, unit, bounds, bounds_at, usual, default, is_live, is_from_bench, is_flat })
+    Some(Parameter {
+        field,
+        name,
+        unit,
+        bounds,
+        bounds_at,
+        usual,
+        default,
+        is_live,
+        is_tunable,
+        is_from_bench,
+        is_flat,
+    })
 }
 
 /// The bounds that a range such as `0.0..=1.0` or `0.0..` says.
@@ -200,7 +218,7 @@ fn between(range: &Expr, faults: &mut Faults) -> Option<TokenStream> {
 
 /// What is declared of a parameter beside its type and its default.
 fn declared(parameter: &Parameter) -> TokenStream {
-    let Parameter { is_live, is_from_bench, .. } = *parameter;
+    let Parameter { is_live, is_tunable, is_from_bench, .. } = *parameter;
     let (name, doc) = (parameter.name.to_string(), text(&parameter.field.attrs));
     let unit = option(parameter.unit.as_ref().map(|unit| quote!(#unit)));
     let (bounds, usual) =
@@ -208,7 +226,7 @@ fn declared(parameter: &Parameter) -> TokenStream {
     quote! {
         ::tactflow_runtime::node::Declared {
             name: #name, doc: #doc, unit: #unit, bounds: #bounds, usual: #usual, is_live: #is_live,
-            is_from_bench: #is_from_bench,
+            is_tunable: #is_tunable, is_from_bench: #is_from_bench,
         }
     }
 }

@@ -9,6 +9,7 @@ mod session;
 pub(crate) use self::core::NodeRunner;
 pub use self::core::{Counters, ModeChange, Timing};
 pub use session::{
-    Beginning, DisplayedPort, End, Engine, Halt, Interrupt, LateTick, Logged, Outcome, Punctuality, Rest, RunOptions,
-    TaskEnd, TaskRun, TickUse, block_io_signals, run, run_virtual,
+    Beginning, Changer, DisplayedPort, End, Engine, Halt, Interrupt, LateTick, LiveValue, Logged, Outcome, Punctuality,
+    Rest, RunOptions, ScheduledChanges, TaskEnd, TaskRun, TickUse, ValueChange, block_io_signals, run, run_changing,
+    run_virtual,
 };

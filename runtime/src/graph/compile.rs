@@ -5,7 +5,7 @@ use std::cell::RefCell;
 use crate::catalogue::Catalogue;
 use crate::device::{RecordedDevice, RoleType};
 use crate::graph::bench::{self, OpenedBench};
-use crate::graph::build::{Builder, BuiltModes, build_modes, find_reach, max_gaps, plan_tasks};
+use crate::graph::build::{Builder, BuiltModes, build_modes, find_reach, max_gaps, plan_live, plan_tasks};
 use crate::graph::check;
 use crate::graph::check::contact::ContactPorts;
 use crate::graph::check::generators::Generators;
@@ -15,7 +15,7 @@ use crate::graph::net::{Net, role_types, slow_down};
 use crate::graph::outline::OutlineBuilder;
 use crate::graph::plan::{AllowedWarning, Plan, PlannedCommand, PlannedMode, PlannedNode, PortRef, RecordedPorts};
 use crate::graph::syntax::RecordTable;
-use crate::source::{Code, Diagnostics, Report, Severity, SourceMap};
+use crate::source::{Code, Diagnostic, Diagnostics, Report, Severity, SourceMap};
 
 /// Checks and builds a graph.
 ///
@@ -46,13 +46,12 @@ pub(crate) fn compile_in(mut loader: Loader, catalogue: &Catalogue, request: &Re
     (loader.joined, loader.beside) = (joined_roles(catalogue), types_beside(catalogue));
     let mut flat = loader.load(request);
     let Loader { mut sources, mut diagnostics, mut measured, has_wrong_roles, .. } = loader;
+    set_live(&mut flat, request, &mut sources, &mut diagnostics);
     if has_wrong_roles || has_unreadable(&diagnostics) {
         // The checks would report everything that a missing file declares, or a missing role provides, as missing.
         return Err(Report::new(sources, split(diagnostics).0));
     }
-    if let Some(bench) = &mut flat.bench {
-        bench::add_models(bench, catalogue, &mut diagnostics);
-    }
+    flat.bench.iter_mut().for_each(|bench| bench::add_models(bench, catalogue, &mut diagnostics));
     let slow = request.slow.unwrap_or(1.0);
     slow_down(&mut flat.limits, slow);
     let beside = role_types(&flat, catalogue, &mut sources);
@@ -77,6 +76,7 @@ pub(crate) fn compile_in(mut loader: Loader, catalogue: &Catalogue, request: &Re
     check::times::check(&net, &opened, period, &mut builder.diagnostics);
     let modes = build_modes(&mut builder, &mut nodes);
     let (modes, starts) = check_modes(&net, modes, period, &mut builder.diagnostics);
+    let live = plan_live(&mut builder, &nodes);
     let mut commands: Vec<PlannedCommand> = net.commands.iter().filter_map(|wire| builder.command(wire)).collect();
     commands.sort_by_key(|command| command.is_report);
     let roles = builder.plan_roles();
@@ -110,7 +110,7 @@ pub(crate) fn compile_in(mut loader: Loader, catalogue: &Catalogue, request: &Re
     let period = ((period * 1e9).round() as i64).max(1);
     let (exports, silences) = (net.exports_by_name(), check::silence::describe(&net, &opened));
     let to_commission = bench::to_commission(&net, &opened, &sources);
-    let plan = Plan { roles, devices: opened.devices, nodes, commands, clock, period, tasks, reach, allowed };
+    let plan = Plan { roles, devices: opened.devices, nodes, commands, clock, period, tasks, reach, live, allowed };
     let recorded = RecordedPorts::default();
     let all = Compiled { plan, view, sources, warnings, outline, exports, facts, silences, to_commission, recorded };
     with_recorded(all, flat.record.as_ref())
@@ -119,6 +119,14 @@ pub(crate) fn compile_in(mut loader: Loader, catalogue: &Catalogue, request: &Re
 /// Returns the devices of a recording, if the request names one.
 fn recorded_devices(request: &Request) -> Option<&[RecordedDevice]> {
     request.recorded.as_ref().map(|recorded| recorded.devices.as_slice())
+}
+
+/// Sets the values of a request that changed while the graph ran.
+fn set_live(flat: &mut FlatGraph, request: &Request, sources: &mut SourceMap, diagnostics: &mut Diagnostics) {
+    let Err(name) = flat.set_live(&request.live) else { return };
+    let span = sources.add(SourceMap::COMMAND_LINE, name.clone(), "").span();
+    let message = format!("the graph writes no value of `{name}`, so it cannot change");
+    diagnostics.push(Diagnostic::new(Code::UnknownKey, span, message));
 }
 
 /// Whether a file is not TOML, cannot be read or is of the wrong sort.

@@ -26,10 +26,10 @@ pub(crate) use compile::compile_in;
 pub use compiled::Compiled;
 pub(crate) use load::{Loader, wrong_file_type};
 pub use load::{RecordedGraph, Request};
-pub use plan::{AllowedWarning, PlannedPort, RecordedPorts};
+pub use plan::{AllowedWarning, LiveParam, PlannedPort, RecordedPorts};
 pub(crate) use plan::{
-    Clock, Condition, Plan, PlannedCommand, PlannedDevice, PlannedExit, PlannedModes, PlannedNode, PlannedRole,
-    PlannedShow, PlannedTask, PlannedView, PlannedWire, PortRef, Producer, Reach, Test,
+    Clock, Condition, LivePlan, Plan, PlannedCommand, PlannedDevice, PlannedExit, PlannedModes, PlannedNode,
+    PlannedRole, PlannedShow, PlannedTask, PlannedView, PlannedWire, PortRef, Producer, Reach, Test,
 };
 pub use syntax::Policy;
 pub(crate) use syntax::{AgeLimit, ExitKind, PolicyTable, PortState, into_diagnostic};

@@ -9,7 +9,7 @@ impl ParamSpec {
     /// Returns the description of a field of type `T`.
     #[must_use]
     pub fn of<T: Param>(declared: &Declared, default: Option<fn() -> T>) -> Self {
-        let Declared { name, doc, unit, bounds, is_live, is_from_bench, .. } = *declared;
+        let Declared { name, doc, unit, bounds, is_live, is_tunable, is_from_bench, .. } = *declared;
         let written = default.and_then(|value| value().written());
         Self {
             name,
@@ -24,6 +24,7 @@ impl ParamSpec {
             repeats: T::CONTENTS.repeats,
             fields: T::fields(),
             is_live,
+            is_tunable,
             is_from_bench,
             fault: written.and_then(|written| fault::<T>(&written, bounds)),
         }

@@ -106,6 +106,13 @@ pub trait AnyNode: Any + Send {
         let _ = configuration;
         false
     }
+    /// Exchanges all configurations with another node of the same type, without allocating. The state and the number of
+    /// the active configuration stay. Returns whether the other node has as many configurations; nothing changes
+    /// otherwise.
+    fn exchange(&mut self, other: &mut dyn AnyNode) -> bool {
+        let _ = other;
+        false
+    }
     /// See [`Node::found`].
     fn found(&self) -> Option<String> {
         None
@@ -215,6 +222,17 @@ impl<N: Node> AnyNode for Cell<N> {
         let Some(next) = self.parked[configuration].take() else { return false };
         self.parked[self.number] = Some(std::mem::replace(&mut self.active, next));
         self.number = configuration;
+        true
+    }
+
+    fn exchange(&mut self, other: &mut dyn AnyNode) -> bool {
+        let Some(other) = (other as &mut dyn Any).downcast_mut::<Self>() else { return false };
+        if other.parked.len() != self.parked.len() {
+            return false;
+        }
+        other.switch(self.number);
+        std::mem::swap(&mut self.active, &mut other.active);
+        std::mem::swap(&mut self.parked, &mut other.parked);
         true
     }
 

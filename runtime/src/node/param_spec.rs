@@ -43,6 +43,8 @@ pub struct ParamSpec {
     pub fields: Vec<ParamSpec>,
     /// Whether a mode can set it while the graph runs.
     pub is_live: bool,
+    /// Whether the section `[live]` of a graph can list it, so that it changes while the graph runs.
+    pub is_tunable: bool,
     /// Whether only a fact can set it, which the bench states and the task cannot.
     pub is_from_bench: bool,
     /// Why the reader refuses the default. The catalogue does not accept such a node.
@@ -95,6 +97,8 @@ pub struct Declared {
     pub usual: Option<Bounds>,
     /// Whether a mode can set it.
     pub is_live: bool,
+    /// Whether the section `[live]` of a graph can list it, so that it changes while the graph runs.
+    pub is_tunable: bool,
     /// Whether only a fact can set it, which the bench states and the task cannot.
     pub is_from_bench: bool,
 }
@@ -103,7 +107,16 @@ impl Declared {
     /// Declares only the name.
     #[must_use]
     pub const fn new(name: &'static str) -> Self {
-        Self { name, doc: "", unit: None, bounds: None, usual: None, is_live: false, is_from_bench: false }
+        Self {
+            name,
+            doc: "",
+            unit: None,
+            bounds: None,
+            usual: None,
+            is_live: false,
+            is_tunable: false,
+            is_from_bench: false,
+        }
     }
 }
 

@@ -1,6 +1,6 @@
 //! What a recording attaches: which graph ran, with which options, on which devices, and all files that it read.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::sync::Arc;
 
 use serde::{Deserialize, Serialize};
@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 use crate::device::RecordedDevice;
 use crate::engine::Engine;
 use crate::graph::{RecordedGraph, Request};
-use crate::source::{AttachedFiles, SourceMap};
+use crate::source::AttachedFiles;
 
 /// Name of the attachment with the options of the run.
 pub(crate) const RUN_FILE: &str = "tactflow/run.toml";
@@ -73,7 +73,7 @@ impl Contents {
             seed,
             period_ns: engine.period(),
         };
-        let mut contents = Self { about, devices: engine.recorded_devices(), files: files_of(engine.sources())? };
+        let mut contents = Self { about, devices: engine.recorded_devices(), files: engine.sources().attach()? };
         contents.about.hash = format!("{:016x}", contents.hash());
         Ok(contents)
     }
@@ -130,25 +130,4 @@ pub(crate) fn about_run(engine: &Engine, request: &Request, is_real: bool) -> St
     let contents = Contents::of(engine, request, (is_real, None));
     let hash = contents.map_or_else(|_| String::new(), |contents| format!(", hash {}", contents.about.hash));
     format!("graph {}{hash}", request.graph.display())
-}
-
-/// Returns all files that a graph has read: its texts, and the files that parameters name.
-fn files_of(sources: &SourceMap) -> Result<AttachedFiles, String> {
-    let texts = sources.files().iter().filter(|file| file.name != SourceMap::COMMAND_LINE);
-    let mut files: AttachedFiles =
-        texts.map(|file| (PathBuf::from(&file.name), file.text.clone().into_bytes())).collect();
-    for path in sources.named() {
-        if !files.contains_key(path) {
-            files.insert(path.to_owned(), read(sources, path)?);
-        }
-    }
-    Ok(files)
-}
-
-fn read(sources: &SourceMap, path: &Path) -> Result<Vec<u8>, String> {
-    match sources.builtin(path) {
-        Ok(Some(bytes)) => Ok(bytes.into_owned()),
-        Ok(None) => std::fs::read(path).map_err(|error| format!("cannot attach `{}`: {error}", path.display())),
-        Err(unknown) => Err(unknown.message),
-    }
 }

@@ -5,7 +5,9 @@
 //! text), `P` a port that was written or lost (u16 port, u8 present, i64 stamp \[ns\], the value if it is present). All
 //! numbers are little-endian, and a text is its length (u32) and UTF-8.
 
-use crate::engine::{Engine, TaskEnd, TaskRun};
+use std::io::Write;
+
+use crate::engine::{Engine, TaskEnd, TaskRun, ValueChange};
 use crate::graph::{PlannedPort, Policy};
 use crate::node::PortId;
 use crate::signal::{Kind, put_text};
@@ -29,6 +31,8 @@ pub(crate) struct Snapshot {
     /// Index of each recorded port in the list of the engine, with its place and its kind.
     ports: Vec<(u16, PortId, Kind)>,
     tasks: Vec<SeenTask>,
+    /// Number of changes of parameters in the snapshots so far.
+    changes: usize,
     bytes: Vec<u8>,
 }
 
@@ -54,6 +58,7 @@ impl Snapshot {
         Self {
             ports: ports().map(|(i, (port, id))| (i as u16, *id, port.shape.kind())).collect(),
             tasks: engine.tasks().iter().map(|_| SeenTask { state: None, halts: 0, is_last_over: true }).collect(),
+            changes: 0,
             bytes: Vec::with_capacity(room + TEXT_BYTES),
         }
     }
@@ -77,6 +82,10 @@ impl Snapshot {
         for (i, (task, seen)) in engine.tasks().iter().zip(&mut self.tasks).enumerate() {
             seen.add(i, task, bytes);
         }
+        for change in engine.value_changes().iter().skip(self.changes) {
+            add_change(bytes, engine, change);
+        }
+        self.changes = engine.value_changes().len();
         let (bus, tick) = (engine.bus(), engine.ticks());
         for (number, id, kind) in &self.ports {
             let mark = bus.mark(*id);
@@ -136,4 +145,16 @@ fn of(task: &TaskRun) -> String {
 fn add_event(bytes: &mut Vec<u8>, level: u8, text: &str) {
     bytes.extend_from_slice(&[EVENT, level]);
     put_text(bytes, text);
+}
+
+/// Adds the event that a parameter begins to change. It is written in place, because a tick must not allocate.
+fn add_change(bytes: &mut Vec<u8>, engine: &Engine, change: &ValueChange) {
+    let Some(param) = engine.live_values().nth(change.param) else { return };
+    bytes.extend_from_slice(&[EVENT, INFO]);
+    let start = bytes.len();
+    put_text(bytes, "");
+    // Writing to a list cannot fail.
+    let _ = write!(bytes, "`{}` changes from {} to {}", param.param.name, change.from, change.to);
+    let length = (bytes.len() - start - size_of::<u32>()) as u32;
+    bytes[start..start + size_of::<u32>()].copy_from_slice(&length.to_le_bytes());
 }

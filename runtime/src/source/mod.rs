@@ -2,6 +2,7 @@
 //!
 //! This is the lowest layer: it has no notion of graphs, nodes or devices.
 
+mod attach;
 mod diagnostic;
 mod fix;
 mod map;

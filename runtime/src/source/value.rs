@@ -128,6 +128,30 @@ impl Table {
 }
 
 impl Value {
+    /// Returns the value behind a few words: keys of tables, and numbers of the items of lists from 0.
+    pub(crate) fn at<T: AsRef<str>>(&self, path: &[T]) -> Option<&Self> {
+        let Some((word, rest)) = path.split_first() else { return Some(self) };
+        let inner = match &self.item {
+            Item::Table(table) => table.get(word.as_ref()),
+            Item::Array(items) => word.as_ref().parse().ok().and_then(|i: usize| items.get(i)),
+            _ => None,
+        };
+        inner?.at(rest)
+    }
+
+    /// Returns the value behind a few words, as [`at`](Self::at) does, to change it.
+    pub(crate) fn at_mut<T: AsRef<str>>(&mut self, path: &[T]) -> Option<&mut Self> {
+        let Some((word, rest)) = path.split_first() else { return Some(self) };
+        let inner = match &mut self.item {
+            Item::Table(table) => {
+                table.entries.iter_mut().find(|(key, _)| key.name == word.as_ref()).map(|(_, value)| value)
+            }
+            Item::Array(items) => word.as_ref().parse().ok().and_then(|i: usize| items.get_mut(i)),
+            _ => None,
+        };
+        inner?.at_mut(rest)
+    }
+
     /// Merges a table into a table or into the items of a list, or returns a value that replaces this one.
     fn merge(&mut self, over: Self) -> Result<(), Self> {
         match (&mut self.item, over.item) {

@@ -48,7 +48,7 @@ pub struct Pid {
 #[derive(Debug, Clone, Param)]
 pub struct Params {
     /// Gains of each feature.
-    #[param(live)]
+    #[param(live, tunable)]
     gains: Map<Gains>,
 }
 

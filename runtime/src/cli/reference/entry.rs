@@ -104,6 +104,8 @@ pub(crate) struct ParamEntry {
     pub(crate) is_required: bool,
     /// Whether a mode can set it.
     pub(crate) is_live: bool,
+    /// Whether `[live]` can list it.
+    pub(crate) is_tunable: bool,
     pub(crate) doc: String,
     /// Text between the name of the parameter and the name of a field in a path.
     #[serde(skip)]
@@ -317,6 +319,7 @@ impl ParamEntry {
             default: spec.default.clone(),
             is_required: !spec.is_optional,
             is_live: spec.is_live,
+            is_tunable: spec.is_tunable,
             doc: spec.doc_with_unit(),
             separator: match spec.repeats {
                 Repeats::Once => ".",

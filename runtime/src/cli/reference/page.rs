@@ -108,7 +108,11 @@ fn add_params(specs: &[ParamEntry], path: &str, items: &mut Vec<Definition>) {
             (None, true) => "required".to_owned(),
             (None, false) => "optional".to_owned(),
         };
-        let live = if param.is_live { "; live" } else { "" };
+        let live = match (param.is_live, param.is_tunable) {
+            (_, true) => "; live, tunable",
+            (true, false) => "; live",
+            (false, false) => "",
+        };
         let summary = format!("{}; {default}{live}", param.takes);
         let words = param.words.iter().map(|(word, doc)| format!("`{word}`: {doc}"));
         let details = [param.doc.clone()].into_iter().chain(words).collect();

@@ -18,7 +18,7 @@ pub(crate) fn events(engine: &Engine, end: i64) -> String {
         let table = modes(&task.changes(), end);
         if table.is_empty() || task.name().is_empty() { table } else { format!("task `{}`\n{table}", task.name()) }
     });
-    tables.collect::<String>() + &halts(engine) + &ends(engine)
+    tables.collect::<String>() + &halts(engine) + &changes(engine) + &ends(engine)
 }
 
 /// Lists the tasks that are parts and have ended, each with its end.
@@ -75,6 +75,28 @@ fn halts(engine: &Engine) -> String {
     let more = listed.saturating_sub(MAX_LISTED) as u64 + unlisted;
     if more > 0 {
         let _ = writeln!(text, "commands held or stopped {more} more times");
+    }
+    if !text.is_empty() {
+        text.push('\n');
+    }
+    text
+}
+
+/// Lists the changes of parameters.
+fn changes(engine: &Engine) -> String {
+    let names: Vec<&str> = engine.live_values().map(|live| live.param.name.as_str()).collect();
+    let all = engine.value_changes();
+    let mut text = String::new();
+    for change in all.iter().take(MAX_LISTED) {
+        let (name, at) = (names[change.param], seconds(change.time));
+        // Writing to a string cannot fail.
+        let _ = writeln!(text, "`{name}` changed from {} to {} at {at:.3} s", change.from, change.to);
+    }
+    if all.len() > MAX_LISTED {
+        let _ = writeln!(text, "parameters changed {} more times", all.len() - MAX_LISTED);
+    }
+    for live in engine.live_values().filter(|live| live.value.to_bits() != live.target.to_bits()) {
+        let _ = writeln!(text, "`{}` was {} at the end, on its way to {}", live.param.name, live.value, live.target);
     }
     if !text.is_empty() {
         text.push('\n');

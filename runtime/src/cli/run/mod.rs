@@ -29,9 +29,9 @@ use super::shell::patience::Patience;
 use super::shell::{FAULTED, INTERRUPTED, Shell, unknown};
 use super::text::number::{milliseconds, seconds};
 use super::text::prose::PageStyle;
-use crate::engine::{self, End, Engine, Interrupt, Outcome, RunOptions};
+use crate::engine::{self, Changer, End, Engine, Interrupt, Outcome, RunOptions, ScheduledChanges};
 use crate::fault::Fault;
-use crate::graph::{Compiled, Request};
+use crate::graph::{Compiled, Request, compile};
 use crate::record::PointsRequest;
 use crate::source::{Code, quoted};
 
@@ -49,6 +49,7 @@ pub use time::duration;
   tactflow run graphs/explore.toml --points surface.ply
   tactflow run graphs/hybrid.toml --set nodes.pid.gains.x.kp=3 --set devices.bench.rate_hz=500
   tactflow run graphs/hybrid.toml --send 0.8s:stop --send 1.2s:resume
+  tactflow run graphs/hybrid.toml --change 2s:pid.gains.y.kp=2
 
 Words: `stop` ramps every command to zero and holds it there, and `resume` releases it.
 A mode of the graph can wait for any other word with `on = \"word\"`."
@@ -95,6 +96,10 @@ pub struct JobOptions {
     /// Send an operator word at a time of the graph's clock, for example 2s:resume; may be repeated
     #[arg(long, value_name = "TIME:WORD", value_parser = time::word)]
     pub send: Vec<(f64, String)>,
+    /// Change a parameter that the graph lists in [live] at a time of the graph's clock, for example
+    /// 2s:pid.gains.x.kp=3; may be repeated
+    #[arg(long, value_name = "TIME:PARAM=VALUE", value_parser = time::change)]
+    pub change: Vec<(f64, String, f64)>,
     /// Read words from standard input during the run, one per line; requires real time
     #[arg(long)]
     pub listen: bool,
@@ -175,6 +180,7 @@ impl Job {
         let silences = plan.silences().to_vec();
         let mut engine = Engine::new(plan);
         self.check_words(&engine)?;
+        let mut changes = self.changes(&mut engine, request, shell)?;
         let run = (request, is_real);
         let mut files = match OutputFiles::create(self, chosen.as_ref(), &mut engine, run, &interrupt, shell) {
             Err(message) if interrupt.is_requested() => {
@@ -202,14 +208,18 @@ impl Job {
         let options =
             RunOptions { duration: *duration, is_realtime: *realtime, sends, listens, ..RunOptions::default() };
         let outcome = without_panic_messages(|| {
-            engine::run(&mut engine, &options, &mut |engine| {
+            let mut observe = |engine: &Engine| {
                 summary.add(engine);
                 if log.is_due(engine) {
                     log.write(engine);
                 }
                 files.add(engine, &patience);
                 progress.show(seconds(engine.now()), engine.ticks(), |style| summary.live(style));
-            })
+            };
+            match &mut changes {
+                Some(changes) => engine::run_changing(&mut engine, &options, changes, &mut observe),
+                None => engine::run(&mut engine, &options, &mut observe),
+            }
         });
         shell.set_patience(&patience.after_run());
         files.end(&engine, &outcome);
@@ -235,6 +245,9 @@ impl Job {
         for (at, word) in self.options.send.iter().filter(|(at, _)| *at > seconds(outcome.time)) {
             shell.warning(format_args!("`{word}` was not sent: the run ended before {at} s"));
         }
+        for (at, name, _) in self.options.change.iter().filter(|(at, ..)| *at > seconds(outcome.time)) {
+            shell.warning(format_args!("`{name}` was not changed: the run ended before {at} s"));
+        }
         let failed: Vec<(&str, &Fault)> = engine.failures().collect();
         for (task, fault) in &failed {
             shell.error(format_args!("task `{task}` has failed: {fault}; its commands went to zero"));
@@ -246,6 +259,21 @@ impl Job {
         }
         shell.error(format_args!("{fault}; every command went to zero{}", endless_stop(engine, fault)));
         FAULTED
+    }
+
+    /// Schedules the changes of parameters, if there are any.
+    fn changes<'s>(
+        &self,
+        engine: &mut Engine,
+        request: &Request,
+        shell: &'s Shell,
+    ) -> Result<Option<ScheduledChanges<'s>>, String> {
+        if self.options.change.is_empty() {
+            return Ok(None);
+        }
+        let catalogue = shell.catalogue();
+        let changer = Changer::new(engine, request, move |request| compile(catalogue, request).map(drop))?;
+        ScheduledChanges::new(changer, &self.options.change).map(Some)
     }
 
     /// Prints a line unless the run is quiet.

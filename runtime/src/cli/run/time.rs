@@ -29,6 +29,18 @@ pub(crate) fn word(text: &str) -> Result<(f64, String), String> {
     }
 }
 
+/// Parses a time, a parameter and a number: `2s:pid.gains.x.kp=3`.
+pub(crate) fn change(text: &str) -> Result<(f64, String, f64), String> {
+    let form = "give a time, a parameter and a number: 2s:pid.gains.x.kp=3";
+    let (at, change) = text.split_once(':').ok_or(form)?;
+    let (name, number) = change.split_once('=').ok_or(form)?;
+    let value: f64 = number.trim().parse().map_err(|_| format!("`{}` is not a number: {form}", number.trim()))?;
+    if name.trim().is_empty() {
+        return Err(form.into());
+    }
+    Ok((time(at, "from 0", |number| number >= 0.0)?, name.trim().to_owned(), value))
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -40,6 +52,15 @@ mod tests {
         }
         for text in ["20", "", "s", "-1s", "0s", "nans", "infs", "3 days"] {
             assert!(duration(text).is_err(), "{text}");
+        }
+    }
+
+    #[test]
+    fn a_change_has_a_time_a_parameter_and_a_number() {
+        assert_eq!(change("2s:pid.gains.x.kp=3"), Ok((2.0, "pid.gains.x.kp".to_owned(), 3.0)));
+        assert_eq!(change("5ms: a.b = -1e-3 "), Ok((0.005, "a.b".to_owned(), -0.001)));
+        for text in ["a.b=1", "2s:a.b", "2s:=1", "2s:a.b=", "2s:a.b=x", "2:a.b=1", "-1s:a.b=1", ""] {
+            assert!(change(text).is_err(), "{text}");
         }
     }
 

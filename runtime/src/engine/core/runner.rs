@@ -123,6 +123,12 @@ impl NodeRunner {
         self.is_switched |= self.node.switch(configuration);
     }
 
+    /// Exchanges all configurations with those of another node of the same type. It keeps its state, and uses the new
+    /// configuration in its next step.
+    pub(crate) fn exchange(&mut self, other: &mut dyn AnyNode) {
+        self.node.exchange(other);
+    }
+
     /// Steps the node if a trigger is new or lost, or makes its outputs absent if a required input is. Sets the tick's
     /// stamp to the oldest stamp of the triggers.
     pub(crate) fn visit(&mut self, tick: &mut Tick, bus: &mut Bus) {

@@ -7,7 +7,7 @@ use super::command::{CommandSlot, ReportSlot};
 use super::inlet::Inlet;
 use super::runner::NodeRunner;
 use super::slot::DeviceSlot;
-use crate::node::{Bus, Tick};
+use crate::node::{AnyNode, Bus, Tick};
 
 /// Everything a tick touches.
 pub(crate) struct Core {
@@ -175,6 +175,11 @@ impl Core {
         for (runner, configuration) in configurations {
             self.runners[runner].switch(configuration);
         }
+    }
+
+    /// Exchanges the configurations of a runner with those of another node of its type.
+    pub(crate) fn exchange(&mut self, runner: usize, other: &mut dyn AnyNode) {
+        self.runners[runner].exchange(other);
     }
 
     /// Resets the runner with that index.

@@ -3,6 +3,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use super::engine::{DisplayedPort, Engine, Logged};
+use super::live_values::LiveValues;
 use super::punctuality::Punctuality;
 use super::schedule::TickSchedule;
 use super::task_run::TaskRun;
@@ -123,8 +124,7 @@ impl Engine {
         let tasks: Vec<TaskRun> = plan.tasks.into_iter().map(|task| task_run(task, &ports)).collect();
         let timing = Timing::new(runners.len());
         let mut core = Core::new(ports.bus, (runners, owners), inlets, (commands, slots), contexts);
-        let modes = tasks.iter().filter_map(|task| task.modes.as_ref());
-        modes.for_each(|modes| core.switch(modes.configurations()));
+        tasks.iter().filter_map(|task| task.modes.as_ref()).for_each(|modes| core.switch(modes.configurations()));
         Self {
             timing,
             core,
@@ -154,6 +154,7 @@ impl Engine {
             late: 0,
             lateness: None,
             punctuality: Punctuality::default(),
+            live: LiveValues::new(plan.live),
             inputs: None,
             recorded,
             replayed: None,

@@ -33,6 +33,7 @@ impl Engine {
         if let Some(log) = &mut self.inputs {
             log.begin(&self.core.tick, late);
         }
+        self.live.take(&mut self.core, self.inputs.as_deref_mut());
         if let Some(by) = late {
             self.raise(Origin::Run, |policy| policy.deadline, Trouble::Late(by))?;
         }

@@ -2,6 +2,7 @@
 
 use super::halt::{Halt, Rest};
 use super::inputs::InputLog;
+use super::live_values::{LiveValue, LiveValues, ValueChange};
 use super::punctuality::Punctuality;
 use super::schedule::TickSchedule;
 use super::task_run::{TaskEnd, TaskRun};
@@ -62,6 +63,8 @@ pub struct Engine {
     pub(super) punctuality: Punctuality,
     /// What a recording of the whole run contains.
     pub(super) recorded: RecordedPorts,
+    /// The parameters that may change while the graph runs.
+    pub(super) live: LiveValues,
     /// The inputs of the tick, if they are logged.
     pub(super) inputs: Option<Box<InputLog>>,
     /// Whether the clock device has sampled in a tick that is replayed.
@@ -365,6 +368,17 @@ impl Engine {
     #[must_use]
     pub const fn recorded_ports(&self) -> &RecordedPorts {
         &self.recorded
+    }
+
+    /// Returns the parameters that may change while the graph runs, in the order of `[live]`.
+    pub fn live_values(&self) -> impl Iterator<Item = LiveValue<'_>> {
+        self.live.iter()
+    }
+
+    /// Returns the changes of parameters so far, at most 10 000.
+    #[must_use]
+    pub fn value_changes(&self) -> &[ValueChange] {
+        self.live.changes()
     }
 
     /// Returns the sources of the graph.

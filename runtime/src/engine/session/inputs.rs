@@ -7,6 +7,7 @@
 //! |---|---|---|
 //! | `W` | an operator word before the tick | text |
 //! | `T` | the tick begins | u64 number, i64 time \[ns\], i64 lateness \[ns\] or 0 |
+//! | `V` | a parameter of `[live]` takes a value in the tick | f64 value, f64 value toward which it moves, text name |
 //! | `X` | the devices were asked | u8: whether the clock device has sampled |
 //! | `R` | the commands of a device were set to zero, because its driver has ended | u16 device |
 //! | `F` | a device has failed | u16 device, text |
@@ -25,6 +26,7 @@ use crate::signal::put_text;
 /// The tags of the items.
 pub(super) const WORD: u8 = b'W';
 pub(super) const TICK: u8 = b'T';
+pub(super) const VALUE: u8 = b'V';
 pub(super) const EXCHANGE: u8 = b'X';
 pub(super) const REST: u8 = b'R';
 pub(super) const FAILURE: u8 = b'F';
@@ -122,6 +124,14 @@ impl InputLog {
         self.bytes.extend_from_slice(&tick.index.to_le_bytes());
         self.bytes.extend_from_slice(&tick.now.to_le_bytes());
         self.bytes.extend_from_slice(&late.unwrap_or(0).to_le_bytes());
+    }
+
+    /// Logs that a parameter takes a value, on its way to another one.
+    pub(super) fn value(&mut self, name: &str, [value, target]: [f64; 2]) {
+        self.bytes.push(VALUE);
+        self.bytes.extend_from_slice(&value.to_le_bytes());
+        self.bytes.extend_from_slice(&target.to_le_bytes());
+        put_text(&mut self.bytes, name);
     }
 
     /// Logs what the devices have sampled, and which have ended or failed.

@@ -3,13 +3,14 @@
 use std::io;
 use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
 use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicI64, Ordering};
 use std::time::{Duration, Instant};
 
 use super::drive::{Pacer, drive, permanent_halt};
 use super::engine::Engine;
 use super::operator::OperatorInput;
 use super::outcome::{End, Outcome, RunOptions};
+use super::scheduled_changes::ScheduledChanges;
 use super::signals::Interrupt;
 use crate::engine::core::DeviceLink;
 use crate::fault::Fault;
@@ -20,7 +21,52 @@ use crate::fault::Fault;
 /// # Errors
 /// If the signal handlers or the threads of the drivers cannot be set up.
 pub fn run(engine: &mut Engine, options: &RunOptions, observe: &mut dyn FnMut(&Engine)) -> io::Result<Outcome> {
+    let pacer = RealTimePacer::start(engine, options, Interrupt::of_run()?)?;
+    drive_to_rest(engine, pacer, observe)
+}
+
+/// Runs as [`run`] does, while parameters change as scheduled.
+///
+/// # Errors
+/// As [`run`], or if the thread that prepares the changes cannot be set up.
+pub fn run_changing(
+    engine: &mut Engine,
+    options: &RunOptions,
+    changes: &mut ScheduledChanges<'_>,
+    observe: &mut dyn FnMut(&Engine),
+) -> io::Result<Outcome> {
     let mut pacer = RealTimePacer::start(engine, options, Interrupt::of_run()?)?;
+    if !pacer.is_real {
+        pacer.changes = Some(changes);
+        return drive_to_rest(engine, pacer, observe);
+    }
+    let (now, is_over) = (AtomicI64::new(0), AtomicBool::new(false));
+    std::thread::scope(|scope| {
+        let work = || changes.work(&now, &is_over);
+        let thread = std::thread::Builder::new().name("changes".into()).spawn_scoped(scope, work);
+        let over = OverAtDrop(&is_over);
+        pacer.time = Some(&now);
+        let outcome = drive_to_rest(engine, pacer, observe);
+        drop(over);
+        thread.and(outcome)
+    })
+}
+
+/// Notes that a run is over, also when it unwinds.
+struct OverAtDrop<'a>(&'a AtomicBool);
+
+impl Drop for OverAtDrop<'_> {
+    fn drop(&mut self) {
+        self.0.store(true, Ordering::Relaxed);
+    }
+}
+
+/// Runs ticks until something ends the run; then the commands ramp to zero.
+fn drive_to_rest(
+    engine: &mut Engine,
+    mut pacer: RealTimePacer<'_, '_>,
+    observe: &mut dyn FnMut(&Engine),
+) -> io::Result<Outcome> {
     // After a panic, for example in `observe`, the arm must come to rest before the unwinding goes on.
     let end = catch_unwind(AssertUnwindSafe(|| drive(engine, pacer.until, &mut pacer, observe)));
     let (time, ticks) = (engine.now(), engine.ticks());
@@ -33,7 +79,7 @@ pub fn run(engine: &mut Engine, options: &RunOptions, observe: &mut dyn FnMut(&E
     Ok(Outcome { end, signal, time, ticks, wall, late: engine.late() })
 }
 
-struct RealTimePacer {
+struct RealTimePacer<'a, 'c> {
     epoch: Instant,
     is_real: bool,
     /// Whether any device is live.
@@ -46,9 +92,13 @@ struct RealTimePacer {
     has_refused: bool,
     input: OperatorInput,
     is_silent: bool,
+    /// The changes of parameters, in virtual time.
+    changes: Option<&'a mut ScheduledChanges<'c>>,
+    /// Where the time of the graph is published [ns], in real time.
+    time: Option<&'a AtomicI64>,
 }
 
-impl RealTimePacer {
+impl RealTimePacer<'_, '_> {
     fn start(engine: &mut Engine, options: &RunOptions, interrupt: Interrupt) -> io::Result<Self> {
         let is_live = engine.is_live();
         let is_real = options.is_realtime || is_live;
@@ -66,11 +116,23 @@ impl RealTimePacer {
         engine.start_drivers(epoch)?;
         let (has_refused, is_silent) = (false, false);
         let cancel = options.cancel.clone();
-        Ok(Self { epoch, is_real, is_live, until, interrupt, cancel, has_refused, input, is_silent })
+        Ok(Self {
+            epoch,
+            is_real,
+            is_live,
+            until,
+            interrupt,
+            cancel,
+            has_refused,
+            input,
+            is_silent,
+            changes: None,
+            time: None,
+        })
     }
 }
 
-impl Pacer for RealTimePacer {
+impl Pacer for RealTimePacer<'_, '_> {
     fn is_interrupted(&self) -> bool {
         let is_cancelled = || self.cancel.as_ref().is_some_and(|cancel| cancel.load(Ordering::Relaxed));
         self.interrupt.is_requested() || is_cancelled()
@@ -84,6 +146,8 @@ impl Pacer for RealTimePacer {
         engine.collect_ended_drivers();
         engine.restart_drivers(self.epoch);
         self.input.carry_out(engine, now);
+        self.changes.iter_mut().for_each(|changes| changes.prepare(now));
+        self.time.iter().for_each(|time| time.store(now, Ordering::Relaxed));
         if self.is_real {
             engine.begin_measured(next + late, next);
         }
@@ -106,7 +170,7 @@ impl Pacer for RealTimePacer {
     }
 }
 
-impl RealTimePacer {
+impl RealTimePacer<'_, '_> {
     /// Logs when a timer replaces the clock device, and when the device is back.
     fn log_clock(&mut self, engine: &Engine) {
         let seconds = engine.now() as f64 * 1e-9;

@@ -1,7 +1,7 @@
 //! Replays the inputs of a recording: writes the samples of the devices, sends the words and runs the tick.
 
 use super::engine::Engine;
-use super::inputs::{EXCHANGE, FAILURE, InputLog, LEASE, PORT, REST, STATES, TICK, WORD};
+use super::inputs::{EXCHANGE, FAILURE, InputLog, LEASE, PORT, REST, STATES, TICK, VALUE, WORD};
 use crate::device::{RecordedDevice, SampleState};
 use crate::engine::core::{DeviceLink, DeviceSlot};
 use crate::fault::Fault;
@@ -57,16 +57,18 @@ impl Engine {
     /// Returns a message if the bytes are no inputs of these devices.
     pub fn replay(&mut self, inputs: &[u8]) -> Result<Result<(), Fault>, String> {
         let mut reader = ByteReader(inputs);
-        let (mut now, mut has_sampled) = (None, false);
+        let (mut now, mut has_sampled, mut values) = (None, false, Vec::new());
         while !reader.0.is_empty() {
             match self.apply(&mut reader) {
                 Some(Item::Tick(time)) => now = Some(time),
                 Some(Item::Exchange(has)) => has_sampled = has,
+                Some(Item::Value(name, value)) => values.push((name, value)),
                 Some(Item::Device) => {}
                 None => return Err("the inputs do not fit the devices of the graph".into()),
             }
         }
         let Some(now) = now else { return Err("the inputs contain no tick".into()) };
+        self.live.replay(&values)?;
         self.replayed = Some(has_sampled);
         Ok(self.tick(now))
     }
@@ -89,6 +91,12 @@ impl Engine {
                     self.begin_late(late);
                 }
                 Some(Item::Tick(now))
+            }
+            VALUE => {
+                let value = [reader.u64()?, reader.u64()?].map(f64::from_bits);
+                let is_finite = value.iter().all(|number| number.is_finite());
+                let name = reader.text()?.to_owned();
+                is_finite.then_some(Item::Value(name, value))
             }
             EXCHANGE => Some(Item::Exchange(reader.u8()? != 0)),
             REST => {
@@ -135,6 +143,8 @@ enum Item {
     Tick(i64),
     /// Whether the clock device has sampled.
     Exchange(bool),
+    /// A parameter, its value and the value toward which it moves.
+    Value(String, [f64; 2]),
     Device,
 }
 

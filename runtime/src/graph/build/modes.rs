@@ -33,7 +33,12 @@ pub(crate) fn build_modes(builder: &mut Builder<'_>, nodes: &mut [PlannedNode]) 
     let mut places = vec![None; net.flat.nodes.len()];
     nodes.iter().enumerate().for_each(|(place, node)| places[node.index] = Some(place));
     let demand = Demand::find(net, &|index| Some(&*nodes[places[index]?].node));
-    let want = |node: &mut PlannedNode| (node.index, node.node.want(demand.of(node.index, &DemandChanges::new())));
+    let (wanted, unchanged) = (&mut builder.wanted, DemandChanges::new());
+    let want = |node: &mut PlannedNode| {
+        let read = demand.of(node.index, &unchanged);
+        wanted.entry(node.index).or_default().push(read.to_vec());
+        (node.index, node.node.want(read))
+    };
     let freezes = nodes.iter_mut().map(want).collect();
     let mut motions = Motions::new((0..places.len()).map(|node| builder.motion(node)).collect());
     let (mut modes, mut demand_changes) = (Vec::new(), Vec::new());
@@ -53,7 +58,9 @@ pub(crate) fn build_modes(builder: &mut Builder<'_>, nodes: &mut [PlannedNode]) 
             variants.extend(built.map(|built| (index, built)));
         }
         for (index, variant) in &mut variants {
-            variant.node.want(demand.of(*index, &changes));
+            let read = demand.of(*index, &changes);
+            variant.node.want(read);
+            builder.wanted.entry(*index).or_default().push(read.to_vec());
         }
         motions.add_mode(variants.iter().map(|(node, variant)| (*node, variant.motion)));
         demand_changes.push(changes);

@@ -10,7 +10,7 @@ use crate::graph::load::MeasuredValues;
 use crate::graph::net::{CommandWire, Net, WireOrigin};
 use crate::graph::plan::{PlannedCommand, PlannedNode, PlannedPort, PlannedRole, PlannedWire, PortRef, Producer};
 use crate::graph::syntax::{AgeLimit, Policy, default_max_age_ns};
-use crate::node::{Built, Configured, Given, Motion, Need, NodeSpec, PortSpec, frame_args};
+use crate::node::{Built, Components, Configured, Given, Motion, Need, NodeSpec, PortSpec, frame_args};
 use crate::signal::{FlagShape, Joint, Kind, Shape};
 use crate::source::{Code, Diagnostic, Diagnostics, Key, SourceMap, Value};
 
@@ -32,7 +32,11 @@ pub(crate) struct Builder<'a> {
     /// What determined the unit of each port.
     origins: BTreeMap<PortRef, UnitOrigin>,
     /// The shapes from which each node was built, and the motion that it generates.
-    built: BTreeMap<usize, (Given, Motion)>,
+    pub(super) built: BTreeMap<usize, (Given, Motion)>,
+    /// The parameters of each configuration of each node, with all facts filled in.
+    pub(super) filled: BTreeMap<usize, Vec<Value>>,
+    /// The components of the outputs that are read of each configuration of each node.
+    pub(super) wanted: BTreeMap<usize, Vec<Vec<Components>>>,
     /// The values of parameters that were written with a unit.
     pub(crate) measured: MeasuredValues,
 }
@@ -58,6 +62,8 @@ impl<'a> Builder<'a> {
             units: BTreeMap::new(),
             origins: BTreeMap::new(),
             built: BTreeMap::new(),
+            filled: BTreeMap::new(),
+            wanted: BTreeMap::new(),
             measured: MeasuredValues::default(),
         };
         builder.add_roles();
@@ -210,6 +216,7 @@ impl Builder<'_> {
             return None;
         }
         let built = self.build(index, configured, &params, given.clone())?;
+        self.filled.entry(index).or_default().push(params);
         let mut ports = Vec::new();
         for (port, (mut shape, output)) in built.outputs.into_iter().zip(&spec.outputs).enumerate() {
             let name = format!("{}.{}", node.name, output.name);
@@ -269,6 +276,7 @@ impl Builder<'_> {
                 return None;
             }
         }
+        self.filled.entry(index).or_default().push(params);
         Some(built)
     }
 

@@ -5,11 +5,11 @@ use std::ops::Range;
 
 use super::task::Task;
 use crate::graph::syntax::{
-    Allowance, BenchDocument, Block, CommandEntry, LimitOwner, LimitSection, ModeBlock, PolicyTable, RecordTable,
-    WireEntry,
+    Allowance, BenchDocument, Block, CommandEntry, LimitOwner, LimitSection, LiveEntry, ModeBlock, PolicyTable,
+    RecordTable, WireEntry,
 };
 use crate::node::Spanned;
-use crate::source::{Key, Named, Value};
+use crate::source::{Item, Key, Named, Value};
 
 /// What a name in a scope refers to, by index.
 #[derive(Debug, Clone, Copy)]
@@ -67,6 +67,8 @@ pub(crate) struct FlatGraph {
     pub(crate) modes: Vec<ModeBlock>,
     pub(crate) bench: Option<BenchDocument>,
     pub(crate) allow: Vec<Allowance>,
+    /// The parameters that may change while the graph runs.
+    pub(crate) live: Vec<LiveEntry>,
     /// What a recording contains.
     pub(crate) record: Option<RecordTable>,
 }
@@ -92,6 +94,23 @@ impl FlatGraph {
         let around = std::iter::successors(Some(task), |task| self.tasks[*task].parent);
         let mut sections = around.filter_map(|task| self.tasks[task].policy.as_ref());
         sections.next().and_then(|(_, policy)| policy.clone()).unwrap_or_default()
+    }
+
+    /// Returns the node whose parameter a name `node.param` means, and the words behind the name of the node.
+    pub(crate) fn param<'n>(&self, name: &'n str) -> Option<(usize, Vec<&'n str>)> {
+        let rest = |node: &FlatNode| name.strip_prefix(&node.name)?.strip_prefix('.');
+        let found = self.nodes.iter().enumerate().filter_map(|(index, node)| Some((index, rest(node)?)));
+        found.min_by_key(|(_, rest)| rest.len()).map(|(index, rest)| (index, rest.split('.').collect()))
+    }
+
+    /// Sets numbers by the names of their parameters. Returns the first name that means nothing.
+    pub(crate) fn set_live(&mut self, values: &[(String, f64)]) -> Result<(), String> {
+        for (name, number) in values {
+            let found = self.param(name);
+            let value = found.and_then(|(node, path)| self.nodes[node].block.params.at_mut(&path));
+            value.ok_or_else(|| name.clone())?.item = Item::Float(*number);
+        }
+        Ok(())
     }
 
     /// Returns the name of a role in the file of a task, or its name in the graph if that file does not declare it.

@@ -66,6 +66,7 @@ impl Loader {
         }
         root.0.merge(graph_set);
         let mut document = self.sections(|sections| sections.graph(&mut root.0));
+        flat.live = self.sections(|sections| sections.live(&root.0, ""));
         flat.record = self.sections(|sections| sections.record(&root.0));
         if document.graph.is_none() {
             let message = "the graph has no section [graph]";

@@ -135,6 +135,7 @@ impl Loader {
         let key = part.key.clone();
         let (roles, around) = (self.part_roles(part, is_task, parent, flat), flat.scopes[parent].task);
         let prefix = format!("{prefix}{}.", part.key.name);
+        flat.live.extend(self.sections(|sections| sections.live(&root, &prefix)));
         let (parent, part_key) = (Some(parent), Some(key));
         let mut scope = Scope { inputs, parent, part: part_key, roles, text, task: around, ..Scope::default() };
         let ends_run = part.on_fail.as_ref().is_some_and(|(on_fail, _)| *on_fail == OnFail::Run);

@@ -22,6 +22,8 @@ pub struct Request {
     pub set: Vec<String>,
     /// Fraction of the limits of speed and acceleration that is used, of the joints as well; `None` for all of it.
     pub slow: Option<f64>,
+    /// Values of parameters that `[live]` lists, by their names there. They replace those of the files.
+    pub live: Vec<(String, f64)>,
     /// What a recording provides instead of devices and files.
     pub recorded: Option<Arc<RecordedGraph>>,
 }

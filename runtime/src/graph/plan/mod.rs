@@ -1,5 +1,6 @@
 //! The plan: what the engine needs, with all names resolved and all nodes built.
 
+mod live;
 mod modes;
 mod port;
 mod record;
@@ -15,6 +16,8 @@ use crate::node::{AnyNode, Need};
 use crate::signal::Shape;
 use crate::source::Code;
 
+pub use live::LiveParam;
+pub(crate) use live::{LivePlan, Recipe};
 pub(crate) use modes::{Condition, PlannedExit, PlannedMode, PlannedModes, Test, WatchedPort};
 pub use port::PlannedPort;
 pub(crate) use port::{PortRef, Producer};
@@ -137,6 +140,8 @@ pub(crate) struct Plan {
     /// The graph itself, and the parts that are tasks.
     pub(crate) tasks: Vec<PlannedTask>,
     pub(crate) reach: Reach,
+    /// The parameters that may change while the graph runs.
+    pub(crate) live: LivePlan,
     /// The warnings that [allow] silences.
     pub(crate) allowed: Vec<AllowedWarning>,
 }

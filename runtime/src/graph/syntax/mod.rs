@@ -4,6 +4,7 @@ mod allow;
 mod binding;
 mod correct;
 mod limits;
+mod live;
 mod model;
 mod modes;
 mod names;
@@ -17,12 +18,13 @@ mod sections;
 pub(crate) use allow::Allowance;
 pub(crate) use binding::Binding;
 pub(crate) use limits::{LimitOwner, LimitSection};
+pub(crate) use live::LiveEntry;
 pub(crate) use modes::{ExitKind, ExitTable, ModeBlock, ModeExit, PortState};
 pub(crate) use names::Use;
 pub use policy::Policy;
 pub(crate) use policy::{AgeLimit, OnFail, PolicyTable, default_max_age_ns, default_max_age_s};
 pub(crate) use record::RecordTable;
-pub(crate) use reserved::{ALLOW_UNCALIBRATED, INPUTS, LIMITS, MODES, NO_ARM, ROBOT, SENSOR, TASK_SECTIONS};
+pub(crate) use reserved::{ALLOW_UNCALIBRATED, INPUTS, LIMITS, LIVE, MODES, NO_ARM, ROBOT, SENSOR, TASK_SECTIONS};
 pub(crate) use sections::{
     BenchDocument, Block, CommandEntry, GraphDocument, GraphTable, PartBlock, Sections, WireEntry, into_diagnostic,
 };

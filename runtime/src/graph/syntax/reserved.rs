@@ -11,13 +11,15 @@ pub(crate) const SENSOR: &str = "sensor";
 /// The keys of a device that name the file of what it drives or reads.
 pub(crate) const MODELS: [&str; 2] = [ROBOT, SENSOR];
 
+/// The section [live].
+pub(crate) const LIVE: &str = "live";
 /// The section [allow].
 pub(super) const ALLOW: &str = "allow";
 /// Key of a bench that allows limits in raw readings.
 pub(crate) const ALLOW_UNCALIBRATED: &str = "allow_uncalibrated";
 
 /// The sections of a graph file.
-pub(super) const GRAPH_SECTIONS: [&str; 14] = [
+pub(super) const GRAPH_SECTIONS: [&str; 15] = [
     "graph",
     "roles",
     "parts",
@@ -27,6 +29,7 @@ pub(super) const GRAPH_SECTIONS: [&str; 14] = [
     "modes",
     "policy",
     "record",
+    LIVE,
     "devices",
     "bind",
     "facts",

@@ -1,0 +1,54 @@
+//! Changes of parameters that are scheduled before the run. In virtual time they are prepared between two ticks, so that
+//! every run is the same; in real time by a thread of their own, so that no tick waits for them.
+
+use std::collections::VecDeque;
+use std::sync::atomic::{AtomicBool, AtomicI64, Ordering};
+use std::time::Duration;
+
+use super::changer::Changer;
+
+/// Interval at which the thread looks for work. The steps in the ring last longer.
+const LOOK: Duration = Duration::from_millis(2);
+
+/// Changes that begin at times of the graph's clock.
+pub struct ScheduledChanges<'c> {
+    changer: Changer<'c>,
+    /// Time [ns], parameter and value, in order of time.
+    due: VecDeque<(i64, String, f64)>,
+}
+
+impl<'c> ScheduledChanges<'c> {
+    /// Schedules changes: time [s], parameter and value.
+    ///
+    /// # Errors
+    /// Returns why one of them is refused.
+    pub fn new(changer: Changer<'c>, changes: &[(f64, String, f64)]) -> Result<Self, String> {
+        for (_, name, value) in changes {
+            changer.find(name, *value)?;
+        }
+        let mut due: Vec<(i64, String, f64)> =
+            changes.iter().map(|(at, name, value)| ((at * 1e9) as i64, name.clone(), *value)).collect();
+        due.sort_by_key(|(at, ..)| *at);
+        Ok(Self { changer, due: due.into() })
+    }
+
+    /// Begins the changes that are due at `now` [ns], and prepares steps for the next ticks.
+    pub(super) fn prepare(&mut self, now: i64) {
+        while let Some((_, name, value)) = self.due.pop_front_if(|(at, ..)| *at <= now) {
+            if let Err(why) = self.changer.set(&name, value) {
+                tracing::warn!("{why}");
+            }
+        }
+        if let Err(why) = self.changer.prepare() {
+            tracing::warn!("a change ends early: {why}");
+        }
+    }
+
+    /// Prepares steps until the run is over. `now` is the time of the graph [ns].
+    pub(super) fn work(&mut self, now: &AtomicI64, is_over: &AtomicBool) {
+        while !is_over.load(Ordering::Relaxed) {
+            self.prepare(now.load(Ordering::Relaxed));
+            std::thread::sleep(LOOK);
+        }
+    }
+}
