@@ -94,7 +94,7 @@ fn an_export_has_the_rows_of_the_run() {
 }
 
 /// Whether Python has a module. Prints loudly if not.
-fn has_python_module(name: &str) -> bool {
+pub(crate) fn has_python_module(name: &str) -> bool {
     let found = std::process::Command::new("python3").args(["-c", &format!("import {name}")]).output();
     let is_there = found.is_ok_and(|output| output.status.success());
     if !is_there {

@@ -164,7 +164,71 @@ fn split(record: &[u8]) -> Option<(u32, &[u8], &[u8])> {
     Some((u32::from_le_bytes(*crc), compression, &rest[..size]))
 }
 
+/// A field of a record.
+#[derive(Debug, Clone, Copy)]
+enum Field {
+    /// A number of so many bytes.
+    Number(usize),
+    /// A text behind its length.
+    Text,
+    /// Pairs of texts behind the length of all of them.
+    Map,
+    /// Bytes behind their length, a number of 64 bits.
+    Data,
+}
+
+/// Whether every field of a record is within it. The library takes memory for a text before it reads it, whatever its
+/// length.
+fn is_within(opcode: u8, mut data: &[u8]) -> bool {
+    use Field::{Data, Map, Number, Text};
+    let fields: &[Field] = match opcode {
+        op::HEADER => &[Text, Text],
+        op::SCHEMA => &[Number(2), Text, Text],
+        op::CHANNEL => &[Number(2), Number(2), Text, Text, Map],
+        op::ATTACHMENT => &[Number(8), Number(8), Text, Text, Data, Number(4)],
+        op::METADATA => &[Text, Map],
+        // Before the end of the data there is no index, and no chunk is in a chunk.
+        op::CHUNK | op::CHUNK_INDEX | op::ATTACHMENT_INDEX | op::METADATA_INDEX => return false,
+        _ => &[],
+    };
+    fields.iter().all(|field| {
+        cut(&mut data, *field).is_some_and(|content| match field {
+            Map => {
+                let mut pairs = content;
+                while !pairs.is_empty() {
+                    if cut(&mut pairs, Text).is_none() {
+                        return false;
+                    }
+                }
+                true
+            }
+            Number(_) | Text | Data => true,
+        })
+    })
+}
+
+/// Cuts a field off the front, and returns its content, or `None` if it ends outside.
+fn cut<'d>(data: &mut &'d [u8], field: Field) -> Option<&'d [u8]> {
+    let (length, rest) = match field {
+        Field::Number(bytes) => (bytes, *data),
+        Field::Text | Field::Map => {
+            let (length, rest) = data.split_first_chunk()?;
+            (usize::try_from(u32::from_le_bytes(*length)).ok()?, rest)
+        }
+        Field::Data => {
+            let (length, rest) = data.split_first_chunk()?;
+            (usize::try_from(u64::from_le_bytes(*length)).ok()?, rest)
+        }
+    };
+    let (content, rest) = rest.split_at_checked(length)?;
+    *data = rest;
+    Some(content)
+}
+
 fn parsed(opcode: u8, data: &[u8]) -> Result<Record<'_>, String> {
+    if !is_within(opcode, data) {
+        return Err("a record is in the wrong place, or a text in it ends outside of it".to_owned());
+    }
     mcap::parse_record(opcode, data).map_err(|error| error.to_string())
 }
 
