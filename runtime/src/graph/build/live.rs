@@ -4,7 +4,7 @@ use super::nodes::Builder;
 use crate::graph::plan::{LiveParam, LivePlan, PlannedNode, Producer, Recipe};
 use crate::graph::syntax::{LIVE, LiveEntry};
 use crate::node::{NodeSpec, ParamSpec};
-use crate::source::{Code, Diagnostic, Item, Value, quoted};
+use crate::source::{Code, Diagnostic, Item, Value, quoted, suggest_name, suggestion};
 
 /// Checks the entries of `[live]`, and returns the parameters that may change. Entries with a mistake are left out.
 pub(crate) fn plan_live(builder: &mut Builder<'_>, nodes: &[PlannedNode]) -> LivePlan {
@@ -36,7 +36,11 @@ fn resolve(
         let names = net.flat.nodes.iter().map(|node| node.name.as_str());
         let node = name.split('.').next().unwrap_or(name);
         let message = format!("`{name}` names no parameter of a node");
-        return Err(mistake(Code::UnknownKey, message).suggest(node, names, "nodes").into());
+        let help = match suggest_name(node, names.clone()) {
+            Some(near) => format!("a node with a similar name is `{near}`"),
+            None => suggestion(node, names, "nodes"),
+        };
+        return Err(mistake(Code::UnknownKey, message).help(help).into());
     };
     let Some(spec) = net.spec(index) else { return Ok(None) };
     let node = &net.flat.nodes[index].name;
