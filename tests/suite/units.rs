@@ -111,7 +111,9 @@ fn every_parameter_of_the_catalogue_accepts_its_own_unit() {
         let units = KnownUnits::of_params(&params, &specs);
         check(&device.name(), &specs, units, &|table, reader| drop(device.open(table, reader)));
     }
-    let refused: Vec<&str> = refused.iter().map(String::as_str).collect();
+    // The units of a `process` are those that its program states.
+    let refused: Vec<&str> =
+        refused.iter().map(String::as_str).filter(|refused| !refused.starts_with("process.")).collect();
     let damping = "ik_sink.damping: the unit of this number [1, m] is not known here, so it cannot be converted";
     assert_eq!(refused, [damping], "its unit depends on the motion");
     assert!(accepted > 150, "only {accepted} parameters");
