@@ -148,8 +148,8 @@ fn a_change_is_in_the_summary_and_comes_again_in_a_replay() {
 #[test]
 fn what_cannot_change_is_refused_before_the_run() {
     let cases = [
-        ("graphs/hybrid.toml", "1s:pid.gains.y.kp=6", "`pid.gains.y.kp` cannot be 6: [live] allows 0.5 to 5"),
-        ("graphs/hybrid.toml", "1s:pid.gains.y.kp=nan", "`pid.gains.y.kp` cannot be NaN: [live] allows 0.5 to 5"),
+        ("graphs/hybrid.toml", "1s:pid.gains.y.kp=7", "`pid.gains.y.kp` cannot be 7: [live] allows 0.5 to 6"),
+        ("graphs/hybrid.toml", "1s:pid.gains.y.kp=nan", "`pid.gains.y.kp` cannot be NaN: [live] allows 0.5 to 6"),
         ("graphs/hybrid.toml", "1s:pid.gains.x.ki=1", "[live] does not list it"),
         ("graphs/force.toml", "1s:pid.gains.x.kp=1", "the graph lists no parameter in [live]"),
         ("graphs/hybrid.toml", "pid.gains.x.kp=1", "give a time, a parameter and a number"),

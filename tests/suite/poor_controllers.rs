@@ -249,6 +249,7 @@ fn good() -> Vec<Variant> {
                 "-in.y",
                 "-gains.y",
                 "-columns.y",
+                "-pid.gains.y.kp",
                 "setpoint = { x = 0.0, pressure = 0.1 }",
                 "select = [1, 0, 1, 0, 0, 0]",
                 "+",
