@@ -309,7 +309,7 @@ fn the_picture_shows_residuals_by_branch_and_a_map() {
         let inside = |point: &str| {
             let (x, y) = point.split_once(',').unwrap();
             let (x, y): (f64, f64) = (x.parse().unwrap(), y.parse().unwrap());
-            (83.0..=961.0).contains(&x) && (40.0..=837.0).contains(&y)
+            (83.0..=961.0).contains(&x) && (40.0..=887.0).contains(&y)
         };
         assert!(points.split(' ').all(inside), "{line}");
     }
