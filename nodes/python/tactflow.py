@@ -189,7 +189,7 @@ class Node:
 
 def node(function: Callable[..., Any]) -> Node:
     """Makes a node of a function: its arguments are inputs and parameters, and its annotation of what it returns names the
-    outputs. An argument that is called ``stamp`` gets the time of the newest input [ns]."""
+    outputs. An argument that is called ``stamp`` gets the oldest time of the new inputs [ns]."""
     annotations = _annotations(function)
     inputs: Dict[str, Port] = {}
     params: Dict[str, Tuple[float, _ParamUnit]] = {}

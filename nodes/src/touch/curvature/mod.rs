@@ -2,7 +2,7 @@
 //!
 //! A least-squares polynomial n = a + b s + c s² (+ d s³) over the tactels, with s along the long axis and n across it,
 //! both from the centre of gravity. The normal equations Σ_j S_(i+j) p_j = Σ w n s^i, with S_k = Σ w s^k, are solved
-//! by a Cholesky factorization, for s in lengths of the line. The curvature is κ = 2 c / (1 + b²)^(3/2).
+//! by a Cholesky factorization, for s in lengths of the line. The curvature is κ = n'' / (1 + n'²)^(3/2).
 //!
 //! The centre of gravity of a bend is beside the line, by κ L²/24 for a length L. The curve is not.
 
