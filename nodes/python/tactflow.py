@@ -28,7 +28,7 @@ import os
 import struct
 import sys
 import time
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Any, BinaryIO, Callable, Dict, Iterator, List, Optional, Sequence, Tuple, Union
 
 import numpy as np
@@ -162,7 +162,6 @@ class Node:
     outputs: Dict[str, Port]
     params: Dict[str, Tuple[float, _ParamUnit]]
     wants_stamp: bool = False
-    values: Dict[str, float] = field(default_factory=dict)
 
     def signature(self) -> Dict[str, Any]:
         """Returns the signature as the protocol states it."""

@@ -251,10 +251,16 @@ impl<'a> Reader<'a> {
         self.entry.filter(|(_, count)| count % units.len() == 0).map_or(Some(declared), of_entry)
     }
 
-    /// Adds a mistake for every missing field. One missing and one unknown name are one mistake.
+    /// Adds a mistake for every missing field. One missing and one unknown name are one mistake. In a dotted key, the unknown
+    /// name must be similar: another name for it leaves the other parts as they are.
     pub fn close(&mut self, table: OpenTable) {
+        let is_dotted = |key: &Key| table.rest.get(&key.name).is_some_and(|value| value.span == key.span);
         let renamed = match (table.missing.as_slice(), table.strange.as_slice()) {
-            ([(missing, _)], [_]) => Some(*missing),
+            ([(missing, _)], [strange])
+                if !is_dotted(strange) || suggest_name(&strange.name, [*missing].into_iter()).is_some() =>
+            {
+                Some(*missing)
+            }
             _ => None,
         };
         for (name, expects) in table.missing.into_iter().filter(|_| renamed.is_none()) {

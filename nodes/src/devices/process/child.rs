@@ -1,4 +1,4 @@
-//! The program as a process: its pipes, what it says, and its end.
+//! The program as a process: its pipes, the frames that it sends, and its end.
 //!
 //! Three threads serve the pipes, so that a program that neither reads nor writes blocks nobody. The program has a process
 //! group of its own, which ends with the run. If this process dies without ending it, a shell that waits at the end of a
@@ -27,7 +27,7 @@ const GRACE: Duration = Duration::from_millis(300);
 
 /// What a program sends.
 #[derive(Debug)]
-pub(super) enum Heard {
+pub(super) enum Received {
     /// The line with its signature.
     Line(String),
     Frame(Frame),
@@ -42,9 +42,9 @@ pub(super) struct Program {
     guard: Option<Child>,
     /// `None` once its standard input has ended.
     input: Option<mpsc::SyncSender<Vec<u8>>>,
-    pub(super) heard: channel::Receiver<Heard>,
+    pub(super) received: channel::Receiver<Received>,
     /// The last line of its standard error.
-    last_words: Arc<Mutex<String>>,
+    last_stderr_line: Arc<Mutex<String>>,
 }
 
 impl Program {
@@ -60,25 +60,25 @@ impl Program {
         let folder = launch.folder.display();
         let mut child = command.spawn().map_err(|error| format!("cannot start `{name}` in `{folder}`: {error}"))?;
         let guard = guard(child.id());
-        let last_words = Arc::default();
+        let last_stderr_line = Arc::default();
         let (input, questions) = mpsc::sync_channel(MAX_UNSENT);
-        let (say, heard) = channel::channel(MAX_WAITING);
+        let (say, received) = channel::channel(MAX_WAITING);
         if let (Some(stdin), Some(stdout), Some(stderr)) =
             (child.stdin.take(), child.stdout.take(), child.stderr.take())
         {
             let max = wire::max_bytes(&launch.signature);
-            let (name, words) = (launch.signature.name.clone(), Arc::clone(&last_words));
+            let (name, words) = (launch.signature.name.clone(), Arc::clone(&last_stderr_line));
             std::thread::spawn(move || pass_on(stdin, &questions));
             std::thread::spawn(move || listen(stdout, max, &say));
             std::thread::spawn(move || log(stderr, &name, &words));
         }
-        Ok(Self { child, guard, input: Some(input), heard, last_words })
+        Ok(Self { child, guard, input: Some(input), received, last_stderr_line })
     }
 
     /// Hands over bytes for the program, without waiting.
     ///
     /// # Errors
-    /// If it has not read what it got before. That it has ended is noticed where it is heard.
+    /// If it has not read what it got before. That it has ended shows where its frames are received.
     pub(super) fn send(&self, bytes: Vec<u8>) -> Result<(), String> {
         match self.input.as_ref().map(|input| input.try_send(bytes)) {
             Some(Err(mpsc::TrySendError::Full(_))) => Err("it does not read its standard input".to_owned()),
@@ -86,8 +86,8 @@ impl Program {
         }
     }
 
-    /// Says how a program has ended whose standard output has.
-    pub(super) fn epitaph(&mut self) -> String {
+    /// Returns how a program has ended whose standard output has ended.
+    pub(super) fn exit_message(&mut self) -> String {
         let end = Instant::now() + GRACE;
         let status = loop {
             match self.child.try_wait() {
@@ -98,7 +98,7 @@ impl Program {
         };
         // Its standard error is read by a thread of its own.
         std::thread::sleep(Duration::from_millis(20));
-        let words = self.last_words.lock().unwrap_or_else(PoisonError::into_inner).clone();
+        let words = self.last_stderr_line.lock().unwrap_or_else(PoisonError::into_inner).clone();
         let how =
             status.map_or_else(|| "it closed its standard output".to_owned(), |status| format!("it ended: {status}"));
         if words.is_empty() { how } else { format!("{how}; it said `{words}`") }
@@ -116,7 +116,7 @@ impl Program {
 
 impl Drop for Program {
     fn drop(&mut self) {
-        // Before the program is waited for: its number belongs to nobody else yet.
+        // The number of a group is taken until its last process has ended, also when the program itself has.
         #[cfg(unix)]
         if let Ok(group) = i32::try_from(self.child.id()) {
             // A group without a process is gone already.
@@ -152,31 +152,31 @@ fn pass_on(mut stdin: ChildStdin, questions: &mpsc::Receiver<Vec<u8>>) {
     }
 }
 
-fn listen(stdout: ChildStdout, max: usize, say: &channel::Sender<Heard>) {
+fn listen(stdout: ChildStdout, max: usize, say: &channel::Sender<Received>) {
     let mut stdout = BufReader::with_capacity(1 << 16, stdout);
     let mut line = Vec::new();
     let first = stdout.by_ref().take(MAX_LINE_BYTES).read_until(b'\n', &mut line);
     if first.is_err() || line.is_empty() {
         return;
     }
-    let mut heard = match String::from_utf8(line) {
-        Ok(line) if line.ends_with('\n') => Heard::Line(line),
-        Ok(_) | Err(_) => Heard::Broken("its first line is not the line of its signature".to_owned()),
+    let mut received = match String::from_utf8(line) {
+        Ok(line) if line.ends_with('\n') => Received::Line(line),
+        Ok(_) | Err(_) => Received::Broken("its first line is not the line of its signature".to_owned()),
     };
     loop {
-        let is_broken = matches!(heard, Heard::Broken(_));
-        if say.blocking_send(heard).is_err() || is_broken {
+        let is_broken = matches!(received, Received::Broken(_));
+        if say.blocking_send(received).is_err() || is_broken {
             return;
         }
-        heard = match wire::read(&mut stdout, max) {
-            Ok(Some(frame)) => Heard::Frame(frame),
+        received = match wire::read(&mut stdout, max) {
+            Ok(Some(frame)) => Received::Frame(frame),
             Ok(None) => return,
-            Err(why) => Heard::Broken(why),
+            Err(why) => Received::Broken(why),
         };
     }
 }
 
-fn log(stderr: ChildStderr, name: &str, last_words: &Mutex<String>) {
+fn log(stderr: ChildStderr, name: &str, last_stderr_line: &Mutex<String>) {
     let mut stderr = BufReader::new(stderr);
     for logged in 0.. {
         let mut line = Vec::new();
@@ -191,7 +191,7 @@ fn log(stderr: ChildStderr, name: &str, last_words: &Mutex<String>) {
             _ => {}
         }
         if !line.trim().is_empty() {
-            *last_words.lock().unwrap_or_else(PoisonError::into_inner) = line;
+            *last_stderr_line.lock().unwrap_or_else(PoisonError::into_inner) = line;
         }
     }
 }

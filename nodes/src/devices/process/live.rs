@@ -38,8 +38,8 @@ impl Live for Beside {
             tokio::select! {
                 biased;
                 () = &mut stopped => break,
-                heard = session.frame() => {
-                    heard?;
+                received = session.frame() => {
+                    received?;
                     return Err("it sends an answer, and nothing was asked".into());
                 }
                 () = commanded => {}

@@ -6,7 +6,7 @@ use async_trait::async_trait;
 use tactflow_runtime::device::{DeviceError, Link, Live, Output};
 use tactflow_runtime::signal::Image;
 
-use super::child::Heard;
+use super::child::Received;
 use super::launch::Launch;
 use super::session::Session;
 use super::wire::{self, Frame, Value};
@@ -49,20 +49,20 @@ impl Live for PadProcess {
             session = Session::start(&self.launch, Vec::new()) => session?,
         };
         loop {
-            let heard = tokio::select! {
+            let received = tokio::select! {
                 biased;
                 () = &mut stopped => break,
-                heard = tokio::time::timeout(self.launch.timeout, session.frame()) => heard,
+                received = tokio::time::timeout(self.launch.timeout, session.frame()) => received,
             };
             let silent = |_| format!("no frame for {} ms", self.launch.timeout.as_millis());
-            let mut frame = heard.map_err(silent)??;
+            let mut frame = received.map_err(silent)??;
             // The newest one: a program that sends too much must not fill the tick with old frames.
-            while let Some(heard) = session.waiting() {
+            while let Some(received) = session.waiting() {
                 link.count("skipped frames");
-                match heard {
-                    Heard::Frame(newer) => frame = newer,
-                    Heard::Broken(why) => return Err(why.into()),
-                    Heard::Line(_) => return Err("it states its signature twice".into()),
+                match received {
+                    Received::Frame(newer) => frame = newer,
+                    Received::Broken(why) => return Err(why.into()),
+                    Received::Line(_) => return Err("it states its signature twice".into()),
                 }
             }
             self.publish(&frame, &mut link)?;

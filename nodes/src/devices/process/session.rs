@@ -6,7 +6,7 @@ use std::time::Duration;
 
 use serde_json::{Value as Json, json};
 
-use super::child::{Heard, Program};
+use super::child::{Program, Received};
 use super::launch::Launch;
 use super::signature::{Signature, VERSION};
 use super::wire::{self, Frame, Question, Value};
@@ -22,7 +22,7 @@ impl Session {
     /// Starts a program, compares its signature with the file, and sends it the shapes of its inputs and its parameters.
     pub(super) async fn start(launch: &Launch, inputs: Vec<Json>) -> Result<Self, String> {
         let mut program = Program::start(launch)?;
-        let stated = hear_signature(&mut program, launch.start).await?;
+        let stated = receive_signature(&mut program, launch.start).await?;
         if let Some(difference) = launch.signature.differs_from(&stated) {
             let command = launch.command.join(" ");
             return Err(format!("{difference}: write the file once more with `tactflow signature -- {command}`"));
@@ -52,17 +52,17 @@ impl Session {
 
     /// Returns the next frame, as soon as it is there.
     pub(super) async fn frame(&mut self) -> Result<Frame, String> {
-        match self.program.heard.recv().await {
-            Some(Heard::Frame(frame)) => Ok(frame),
-            Some(Heard::Broken(why)) => Err(why),
-            Some(Heard::Line(_)) => Err("it states its signature twice".to_owned()),
-            None => Err(self.program.epitaph()),
+        match self.program.received.recv().await {
+            Some(Received::Frame(frame)) => Ok(frame),
+            Some(Received::Broken(why)) => Err(why),
+            Some(Received::Line(_)) => Err("it states its signature twice".to_owned()),
+            None => Err(self.program.exit_message()),
         }
     }
 
     /// Returns a frame that is there already.
-    pub(super) fn waiting(&mut self) -> Option<Heard> {
-        self.program.heard.try_recv().ok()
+    pub(super) fn waiting(&mut self) -> Option<Received> {
+        self.program.received.try_recv().ok()
     }
 
     /// Lets the program end by itself.
@@ -71,17 +71,18 @@ impl Session {
     }
 }
 
-async fn hear_signature(program: &mut Program, patience: Duration) -> Result<Signature, String> {
-    let heard = tokio::time::timeout(patience, program.heard.recv()).await;
-    let heard = heard.map_err(|_| format!("it has not stated its signature within {} s", patience.as_secs_f64()))?;
-    match heard {
-        Some(Heard::Line(line)) => Signature::from_line(&line).map_err(|why| {
+async fn receive_signature(program: &mut Program, patience: Duration) -> Result<Signature, String> {
+    let received = tokio::time::timeout(patience, program.received.recv()).await;
+    let received =
+        received.map_err(|_| format!("it has not stated its signature within {} s", patience.as_secs_f64()))?;
+    match received {
+        Some(Received::Line(line)) => Signature::from_line(&line).map_err(|why| {
             let start: String = line.trim_end().chars().take(60).collect();
             format!("its first line is no signature: {why} (it begins with `{start}`)")
         }),
-        Some(Heard::Broken(why)) => Err(why),
-        Some(Heard::Frame(_)) => Err("it sends a frame before its signature".to_owned()),
-        None => Err(program.epitaph()),
+        Some(Received::Broken(why)) => Err(why),
+        Some(Received::Frame(_)) => Err("it sends a frame before its signature".to_owned()),
+        None => Err(program.exit_message()),
     }
 }
 
@@ -109,7 +110,7 @@ pub(crate) fn ask_signature(command: &[String], folder: &Path, patience: Duratio
     let runtime = tokio::runtime::Builder::new_current_thread().enable_time().build();
     let runtime = runtime.map_err(|error| error.to_string())?;
     let mut program = Program::start(&launch)?;
-    let signature = runtime.block_on(hear_signature(&mut program, patience))?;
+    let signature = runtime.block_on(receive_signature(&mut program, patience))?;
     program.dismiss();
     Ok(signature)
 }

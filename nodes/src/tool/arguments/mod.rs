@@ -28,6 +28,11 @@ pub(super) fn may_replace(path: &Path, what: &str, is_one: impl Fn(&str) -> bool
     }
 }
 
+/// Refuses to replace a file that is no SVG picture. An empty file may be replaced.
+pub(super) fn may_draw(path: &Path) -> Result<(), String> {
+    may_replace(path, "an SVG picture", |text| text.trim().is_empty() || text.trim_start().starts_with("<svg"))
+}
+
 /// Writes a file.
 pub(super) fn write(path: &Path, text: &str) -> Result<(), String> {
     std::fs::write(path, text).map_err(|error| format!("cannot write `{}`: {error}", path.display()))

@@ -13,7 +13,7 @@ use crate::calibration::report::{CalibrationReport, Settings, TactelStatus, cali
 use crate::calibration::samples::LoadKind;
 use crate::calibration::{CurveKind, file, plot};
 use crate::recordings::{self, Assumed, Hints, Refusal};
-use crate::tool::arguments::{may_replace, pair, positive, write};
+use crate::tool::arguments::{may_draw, may_replace, pair, positive, write};
 
 /// The arguments of a calibration of the tactels.
 #[derive(Args)]
@@ -78,7 +78,7 @@ fn check(args: &PadArgs) -> Result<(), String> {
         return Err("`--bearing` needs `--load uniform`: the force of a probe is on one tactel".into());
     }
     args.out.as_deref().map_or(Ok(()), |path| may_replace(path, "a calibration file", file::is_calibration))?;
-    args.svg.as_deref().map_or(Ok(()), |path| may_replace(path, "an SVG picture", |text| text.contains("<svg")))
+    args.svg.as_deref().map_or(Ok(()), may_draw)
 }
 
 fn make(args: &PadArgs, logs: &[Log], shell: &Shell) -> Result<(), String> {

@@ -11,7 +11,7 @@ use std::path::PathBuf;
 use tactflow_runtime::cli::{Job, JobOptions, Print, Shell, clap, duration};
 use tactflow_runtime::graph::Request;
 
-use super::arguments::{may_replace, pair, positive, write};
+use super::arguments::{may_draw, pair, positive, write};
 use crate::recordings::{self, Hints, Recording, TIME_UNITS};
 use graph::{ContactRules, count_regions};
 
@@ -152,7 +152,7 @@ impl FeaturesArgs {
         if self.out.as_ref().is_some_and(|out| out.as_os_str() == "-") {
             return Err("`--svg` draws the rows of a file: write `-o features.csv` instead of `-o -`".into());
         }
-        may_replace(svg, "an SVG picture", |text| text.starts_with("<svg "))
+        may_draw(svg)
     }
 
     /// Returns the request of a graph, with the settings as `--set`, so that a mistake shows in the arguments.

@@ -45,12 +45,9 @@ pub(super) fn draw(title: &str, table: &Path) -> Result<String, String> {
         return Ok(svg.finish());
     };
     let top = 8.0 + 2.0 * LINE;
-    let [x_axis, y_axis, bottom] = {
-        let scale = ((ACROSS[1] - ACROSS[0]) / (x[1] - x[0])).min(HEIGHTS[0] / (y[1] - y[0]));
-        let [right, bottom] = [ACROSS[0] + scale * (x[1] - x[0]), top + scale * (y[1] - y[0])];
-        [[ACROSS[0], right], [bottom, top], [bottom, 0.0]]
-    };
-    let bottom = bottom[0];
+    let scale = ((ACROSS[1] - ACROSS[0]) / (x[1] - x[0])).min(HEIGHTS[0] / (y[1] - y[0]));
+    let [right, bottom] = [ACROSS[0] + scale * (x[1] - x[0]), top + scale * (y[1] - y[0])];
+    let (x_axis, y_axis) = ([ACROSS[0], right], [bottom, top]);
     let last = bottom + GAP + LINE + HEIGHTS[1];
     let mut svg = Svg::new([WIDTH, last + GAP], title);
     legend(&mut svg, &names, ACROSS, 4.0);

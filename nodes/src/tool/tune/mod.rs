@@ -16,7 +16,7 @@ use tactflow_runtime::cli::clap::{self, ValueEnum};
 use tactflow_runtime::cli::{GraphArgs, Shell};
 use tactflow_runtime::graph::{Outline, OutlinedMode, Request, compile};
 
-use super::arguments::{may_replace, write};
+use super::arguments::{may_draw, write};
 use super::control::chain::chain;
 use super::control::choose::{Wanted, factor};
 use super::control::contacts::{Answer, Contact};
@@ -185,7 +185,7 @@ pub(super) fn run(args: TuneArgs, shell: &Shell) -> Result<u8, u8> {
 
 /// Checks before the long measurement that a picture can be written.
 fn writable(path: &Path) -> Result<(), String> {
-    may_replace(path, "an SVG picture", |text| text.trim().is_empty() || text.trim_start().starts_with("<svg"))?;
+    may_draw(path)?;
     let opened = std::fs::OpenOptions::new().append(true).create(true).open(path);
     opened.map(drop).map_err(|error| format!("cannot write `{}`: {error}", path.display()))
 }

@@ -19,7 +19,7 @@ use curve::{Axes, Curve, curve};
 
 /// Measures how a line bends, where it is, and the turning rate with which a sensor follows it.
 ///
-/// `x`, `y` and `orientation` are the point and the tangent of the line abreast of the middle of the pad. The centre of
+/// `x`, `y` and `orientation` are the point and the tangent of the line beside the middle of the pad. The centre of
 /// gravity is beside a line that bends: for a bend of 44 mm radius of which 30 mm are seen, by 0.85 mm. If the line ends
 /// before the middle, they are those of its end. While the contact is no line that can be trusted, they are the centre
 /// of gravity and the long axis, as of `moments`.
@@ -170,7 +170,7 @@ struct Line {
     centre: [f64; 2],
     /// Direction of its long axis along x and y.
     axis: [f64; 2],
-    /// Place on this axis abreast of the middle of the pad, from the centre of gravity [m].
+    /// Place on this axis beside the middle of the pad, from the centre of gravity [m].
     at: f64,
     /// The line at this place.
     curve: Curve,

@@ -108,7 +108,7 @@ fn a_line_that_bends_is_where_it_is_and_not_at_its_centre_of_gravity() {
 }
 
 #[test]
-fn a_line_is_measured_abreast_of_the_middle_of_the_pad() {
+fn a_line_is_measured_beside_the_middle_of_the_pad() {
     // A parabola that is pressed more on one side, and one that ends before the middle.
     let (curvature, lopsided) = (8.0, |x: f64| 1.0 + 20.0 * x);
     let bend = |x: f64, y: f64| libm::exp(-0.5 * ((y - 0.5 * curvature * x * x) / 0.004).powi(2));
@@ -211,7 +211,7 @@ fn wrong_parameters_are_refused() {
 }
 
 /// The curvature of the weighted least-squares polynomial in the axes of the covariance [1/m], and its point [m] and its
-/// tangent abreast of the middle of the pad; `None` without a clear axis.
+/// tangent beside the middle of the pad; `None` without a clear axis.
 fn least_squares(tactels: &[(f64, Vector2<f64>)], degree: usize) -> Option<(f64, Vector2<f64>, Vector2<f64>)> {
     let sum: f64 = tactels.iter().map(|(weight, _)| weight).sum();
     let centre = tactels.iter().fold(Vector2::zeros(), |sum, (weight, at)| sum + at * *weight) / sum;

@@ -128,7 +128,7 @@ impl<'c> Changer<'c> {
 
     /// Builds the next step, or returns `None` if every parameter has its value.
     fn next_step(&mut self) -> Result<Option<Step>, String> {
-        let (mut values, mut recipes) = (Vec::new(), Vec::new());
+        let mut values = Vec::new();
         for (at, (param, [value, target])) in self.plan.params.iter().zip(&self.fronts).enumerate() {
             if value.to_bits() != target.to_bits() {
                 let longest = param.rate * self.spacing;
@@ -136,23 +136,21 @@ impl<'c> Changer<'c> {
                     if (target - value).abs() <= longest { *target } else { value + longest.copysign(target - value) };
                 // A step that is too small for the number's precision would never end.
                 values.push((at, [if next.to_bits() == value.to_bits() { *target } else { next }, *target]));
-                recipes.push(param.recipe);
             }
         }
         if values.is_empty() {
             return Ok(None);
         }
-        recipes.sort_unstable();
-        recipes.dedup();
         let mut numbers: Vec<f64> = self.fronts.iter().map(|[value, _]| *value).collect();
         values.iter().for_each(|(at, [value, _])| numbers[*at] = *value);
-        match self.plan.nodes(&recipes, &numbers) {
-            Ok(nodes) => {
-                values.iter().for_each(|(at, value)| self.fronts[*at] = *value);
-                Ok(Some(Step { nodes, values }))
+        let changed: Vec<usize> = values.iter().map(|(at, _)| *at).collect();
+        match self.plan.step(values, &numbers) {
+            Ok(step) => {
+                step.values.iter().for_each(|(at, value)| self.fronts[*at] = *value);
+                Ok(Some(step))
             }
             Err(why) => {
-                values.iter().for_each(|(at, _)| self.fronts[*at][1] = self.fronts[*at][0]);
+                changed.iter().for_each(|at| self.fronts[*at][1] = self.fronts[*at][0]);
                 Err(why)
             }
         }

@@ -3,6 +3,7 @@
 //! A change walks to its target in steps. Each step is a node that was built again off the tick. The tick exchanges its
 //! configurations with those of the running node, and sends the old ones back, so that it neither allocates nor frees.
 
+use std::collections::BTreeSet;
 use std::sync::Arc;
 
 use rtrb::{Consumer, Producer};
@@ -92,18 +93,15 @@ impl LiveValues {
             return Ok(());
         }
         let mut numbers: Vec<f64> = self.values.iter().map(|[value, _]| *value).collect();
-        let (mut values, mut recipes) = (Vec::new(), Vec::new());
+        let mut values = Vec::new();
         for (name, value) in recorded {
             let Some(at) = self.plan.params.iter().position(|param| param.name == *name) else {
                 return Err(format!("the run changes `{name}`, which the graph does not list in [live]"));
             };
             values.push((at, *value));
             numbers[at] = value[0];
-            recipes.push(self.plan.params[at].recipe);
         }
-        recipes.sort_unstable();
-        recipes.dedup();
-        self.replayed = Some(Step { nodes: self.plan.nodes(&recipes, &numbers)?, values });
+        self.replayed = Some(self.plan.step(values, &numbers)?);
         Ok(())
     }
 
@@ -155,12 +153,14 @@ impl LiveValues {
 }
 
 impl LivePlan {
-    /// Builds the nodes of some recipes again, each with its place.
+    /// Builds a step: the nodes of the parameters that it changes, with a value of each parameter.
     ///
     /// # Errors
     /// The mistakes of a node.
-    pub(super) fn nodes(&self, recipes: &[usize], values: &[f64]) -> Result<PlacedNodes, String> {
-        let node = |recipe: &usize| Ok((self.recipes[*recipe].place, self.build(*recipe, values)?));
-        recipes.iter().map(node).collect()
+    pub(super) fn step(&self, changed: Vec<(usize, [f64; 2])>, values: &[f64]) -> Result<Step, String> {
+        let recipes: BTreeSet<usize> = changed.iter().map(|(param, _)| self.params[*param].recipe).collect();
+        let node = |recipe: usize| Ok((self.recipes[recipe].place, self.build(recipe, values)?));
+        let nodes = recipes.into_iter().map(node).collect::<Result<PlacedNodes, String>>()?;
+        Ok(Step { nodes, values: changed })
     }
 }
