@@ -27,14 +27,18 @@ fn without_the_end(out: &str) -> String {
 
 /// The same on a terminal of that width.
 fn on_a_terminal(cols: usize, args: &[&str]) -> String {
+    let said = said_to_a_terminal(cols, args);
+    assert_eq!(said.code, 0, "{}", said.err);
+    said.out.replace('\r', "")
+}
+
+fn said_to_a_terminal(cols: usize, args: &[&str]) -> Said {
     let inner = tool(args);
     let script = tactflow_tests::workspace().join("tests/peers/terminal.py");
     let mut command = Command::new("python3");
     command.arg(script).args(["sh", "-c", "stty rows 60 cols $0; exec \"$@\"", &cols.to_string()]);
     command.arg(inner.get_program()).args(inner.get_args()).current_dir(tactflow_tests::workspace());
-    let said = said(command.stdin(Stdio::null()).env_remove("NO_COLOR").env_remove("RUST_LOG"));
-    assert_eq!(said.code, 0, "{}", said.err);
-    said.out.replace('\r', "")
+    said(command.stdin(Stdio::null()).env_remove("NO_COLOR").env_remove("RUST_LOG"))
 }
 
 /// The text without what colours it.
@@ -167,4 +171,38 @@ fn while_it_runs_a_terminal_sees_the_image_and_a_pipe_nothing() {
     let narrow = on_a_terminal(30, &args);
     assert!(!narrow.contains(": now") && narrow.contains('%'), "{narrow}");
     assert_eq!(say(&args).err, "");
+}
+
+#[test]
+fn while_it_runs_a_terminal_sees_the_mode_the_limits_and_what_holds_the_commands() {
+    let seen = on_a_terminal(100, &["run", HYBRID, "--realtime", "--for", "2s"]);
+    for text in ["mode approach for 0.", "mode servo for 0.", "limited by move.contact.force to "] {
+        assert!(seen.contains(text), "{text}: {seen}");
+    }
+    assert!(!seen.contains("commands held"), "{seen}");
+    let halted = said_to_a_terminal(100, &["run", HYBRID, "--realtime", "--send", "0.9s:stop", "--send", "1.7s:resume", "--for", "2s"]).out;
+    assert!(halted.contains("commands stopped until `resume`: "), "{halted}");
+}
+
+#[test]
+fn while_it_runs_the_curves_are_those_of_the_last_ten_seconds() {
+    let seen = on_a_terminal(100, &["run", HYBRID, "--color=never"]);
+    // A control of the cursor ends with a letter.
+    let controls = seen.split(ESCAPE).map(|part| part.split_once(char::is_alphabetic).map_or(part, |(_, rest)| rest));
+    let seen: String = controls.collect();
+    // The first and the last time of each axis.
+    let span = |line: &str| -> Option<[f64; 2]> {
+        let times: Vec<f64> = line
+            .trim()
+            .split(" s")
+            .filter(|text| !text.is_empty())
+            .map(|text| text.trim().parse().ok())
+            .collect::<Option<_>>()?;
+        (times.len() == 3).then(|| [times[0], times[2]])
+    };
+    let spans: Vec<[f64; 2]> = seen.lines().filter_map(span).collect();
+    let (whole, live) = spans.split_last().expect("the page has an axis");
+    assert!(whole[0] == 0.0 && whole[1] > 20.0, "{whole:?}");
+    assert!(live.iter().all(|[first, last]| last - first < 10.5), "{live:?}");
+    assert!(live.iter().any(|[first, _]| *first > 0.0), "{live:?}");
 }

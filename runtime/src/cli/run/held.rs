@@ -12,6 +12,8 @@ const STOPPED_SCALE: f64 = 0.1;
 const MIN_STOPPED_S: f64 = 2.0;
 /// Part of the time of the last mode, and of the run, from which on a stop is reported [1].
 const MIN_SHARE: [f64; 2] = [0.5, 0.2];
+/// A scale that differs from one by less is no limit [1].
+const ROUNDING: f64 = 1e-6;
 /// Modes chatter if they change more often than this within [`CHATTER_NS`].
 const MAX_CHANGES: usize = 20;
 /// Time in which changes of modes are counted [ns].
@@ -24,6 +26,8 @@ struct LimitUse {
     id: PortId,
     /// Time during which it reduced the motion [s].
     reduced: f64,
+    /// Factor by which it scales the motion now [1].
+    scale: f64,
     /// Smallest factor by which it scaled the motion [1].
     smallest_scale: f64,
     /// Time during which it stopped the motion in the current mode [s].
@@ -49,6 +53,7 @@ impl LimitWatch {
             name: name.to_owned(),
             id,
             reduced: 0.0,
+            scale: 1.0,
             smallest_scale: 1.0,
             stopped_in_mode: 0.0,
             stopped: 0.0,
@@ -66,9 +71,10 @@ impl LimitWatch {
             self.limits.iter_mut().for_each(|limit| limit.stopped_in_mode = 0.0);
         }
         for limit in &mut self.limits {
+            limit.scale = 1.0;
             let Some(&scale) = engine.bus().get::<Scalar>(limit.id) else { continue };
-            // A difference by rounding is no limit.
-            if scale < 1.0 - 1e-6 {
+            limit.scale = scale;
+            if scale < 1.0 - ROUNDING {
                 limit.reduced += dt;
                 limit.smallest_scale = limit.smallest_scale.min(scale);
             }
@@ -77,6 +83,12 @@ impl LimitWatch {
                 limit.stopped += dt;
             }
         }
+    }
+
+    /// Returns the limits that reduce the motion now, each with its scale [1].
+    pub(crate) fn acting(&self) -> impl Iterator<Item = (&str, f64)> {
+        let acting = self.limits.iter().filter(|limit| limit.scale < 1.0 - ROUNDING);
+        acting.map(|limit| (limit.name.as_str(), limit.scale))
     }
 
     /// Writes the table of the limits that reduced the motion.

@@ -9,6 +9,7 @@ pub(super) mod log;
 mod ports;
 mod progress;
 mod slow;
+mod status;
 pub(super) mod summary;
 pub(super) mod target;
 mod time;
@@ -214,7 +215,7 @@ impl Job {
                     log.write(engine);
                 }
                 files.add(engine, &patience);
-                progress.show(seconds(engine.now()), engine.ticks(), |style| summary.live(style));
+                progress.show(seconds(engine.now()), engine.ticks(), |style| summary.live(engine, style));
             };
             match &mut changes {
                 Some(changes) => engine::run_changing(&mut engine, &options, changes, &mut observe),

@@ -6,6 +6,7 @@ use super::events::events;
 use super::held::{LimitWatch, chatter};
 use super::lateness::lateness;
 use super::ports::{PortTable, node_times};
+use super::status::status;
 use crate::cli::text::prose::PageStyle;
 use crate::cli::view::RunView;
 use crate::engine::{Counters, End, Engine, Outcome, TaskEnd, TaskRun};
@@ -54,12 +55,13 @@ impl Summary {
         }
     }
 
-    /// Returns the parts of the view that is drawn during the run.
-    pub(crate) fn live(&self, style: PageStyle) -> Vec<String> {
-        match &self.body {
+    /// Returns the parts of the view that is drawn during the run, the most important one first.
+    pub(crate) fn live(&self, engine: &Engine, style: PageStyle) -> Vec<String> {
+        let view = match &self.body {
             Body::View(view) => view.live(style),
             Body::Ports(_) => Vec::new(),
-        }
+        };
+        status(engine, &self.limits).into_iter().chain(view).collect()
     }
 
     /// Writes the summary.

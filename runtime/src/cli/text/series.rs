@@ -7,7 +7,8 @@ const BARS: [char; 8] = ['▁', '▂', '▃', '▄', '▅', '▆', '▇', '█']
 /// Maximum number of bins of a sparkline; a long run has at least half as many.
 const SPARKLINE_BINS: usize = 48;
 
-/// A value over time in at most `capacity` bins. When all bins are in use, neighbours are merged in pairs.
+/// A value over time in at most `capacity` bins. When all bins are in use, neighbours are merged in pairs, or the oldest
+/// bin is forgotten.
 #[derive(Debug, Clone)]
 pub(crate) struct Series {
     bins: Vec<SeriesBin>,
@@ -16,6 +17,8 @@ pub(crate) struct Series {
     stride: u64,
     /// Ticks in the last bin.
     ticks: u64,
+    /// Whether the oldest bin is forgotten.
+    is_sliding: bool,
 }
 
 /// Statistics of a value over some ticks.
@@ -78,14 +81,22 @@ impl Series {
 
     /// Creates a series of at most `capacity` bins, an even number.
     pub(crate) fn with_capacity(capacity: usize) -> Self {
-        Self { bins: Vec::with_capacity(capacity), capacity, stride: 1, ticks: 0 }
+        Self { bins: Vec::with_capacity(capacity), capacity, stride: 1, ticks: 0, is_sliding: false }
+    }
+
+    /// Creates a series of the last `capacity` bins, each of `stride` ticks.
+    pub(crate) fn sliding(capacity: usize, stride: u64) -> Self {
+        Self { stride, is_sliding: true, ..Self::with_capacity(capacity) }
     }
 
     /// Adds the value of the next tick. A value that is not finite counts as absent.
     pub(crate) fn add(&mut self, value: f64) {
         if self.bins.is_empty() || self.ticks == self.stride {
             if self.bins.len() == self.capacity {
-                self.halve();
+                match self.is_sliding {
+                    true => _ = self.bins.remove(0),
+                    false => self.halve(),
+                }
             }
             self.bins.push(SeriesBin::EMPTY);
             self.ticks = 0;
@@ -166,6 +177,14 @@ mod tests {
         assert!((whole.mean - mean).abs() < 1e-9 * mean, "{} {mean}", whole.mean);
         assert!((whole.deviation() - variance.sqrt()).abs() < 1e-6, "{} {}", whole.deviation(), variance.sqrt());
         assert_eq!((whole.low, whole.high), (1e6, 1e6 + 16.0));
+    }
+
+    #[test]
+    fn a_sliding_series_has_the_last_ticks() {
+        let mut series = Series::sliding(4, 10);
+        (0..95).for_each(|i| series.add(f64::from(i)));
+        let bins: Vec<[f64; 2]> = series.bins().iter().map(|bin| [bin.low, bin.high]).collect();
+        assert_eq!(bins, [[60.0, 69.0], [70.0, 79.0], [80.0, 89.0], [90.0, 94.0]]);
     }
 
     #[test]

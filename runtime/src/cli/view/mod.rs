@@ -15,6 +15,8 @@ use images::{ImageHistory, MIN_WIDE_PAGE};
 
 /// Share of the run at its end for which mean and deviation are printed [1].
 const TAIL: f64 = 0.2;
+/// Time that the curves show while the graph runs [s].
+const WINDOW: f64 = 10.0;
 /// Width of the title and the numbers beside a curve [characters].
 const PANEL_WIDTH: usize = 27;
 
@@ -28,6 +30,8 @@ pub(crate) struct RunView {
     pub(crate) curves: Vec<ColumnCurve>,
     /// Times of the ticks [s], in the same bins as the curves.
     pub(crate) times: Series,
+    /// Times of the last ticks [s], in the same bins as the curves of the last ticks.
+    recent_times: Series,
 }
 
 /// A column of a port over time.
@@ -37,7 +41,10 @@ pub(crate) struct ColumnCurve {
     /// Full name of the column, as in a recording.
     pub(crate) column: String,
     pub(crate) unit: Unit,
+    /// Over the whole run.
     pub(crate) series: Series,
+    /// Over the last [`WINDOW`].
+    recent: Series,
 }
 
 impl RunView {
@@ -54,6 +61,7 @@ impl RunView {
             }
         }
         let columns = PortColumns::new(&ports);
+        let stride = (WINDOW / seconds(engine.period()) / bins as f64).ceil().max(1.0) as u64;
         let owners = plotted.iter().zip(&ports);
         let owners = owners.flat_map(|(name, (port, _))| vec![name; PortColumns::width(&port.shape)]);
         let curve = |(column, name): (&PortColumn, &String)| ColumnCurve {
@@ -64,18 +72,21 @@ impl RunView {
             column: column.name.clone(),
             unit: column.unit,
             series: Series::with_capacity(bins),
+            recent: Series::sliding(bins, stride),
         };
         let curves = columns.list.iter().zip(owners).map(curve).collect();
         let (row, times) = (vec![f64::NAN; columns.list.len()], Series::with_capacity(bins));
-        Self { images, plotted, columns, row, curves, times }
+        Self { images, plotted, columns, row, curves, times, recent_times: Series::sliding(bins, stride) }
     }
 
     /// Adds the last tick of the engine.
     pub(crate) fn add(&mut self, engine: &Engine) {
         self.times.add(seconds(engine.now()));
+        self.recent_times.add(seconds(engine.now()));
         self.columns.read(engine.bus(), &mut self.row);
         for (curve, value) in self.curves.iter_mut().zip(&self.row) {
             curve.series.add(*value);
+            curve.recent.add(*value);
         }
         for image in &mut self.images {
             image.add(engine);
@@ -84,24 +95,30 @@ impl RunView {
 
     /// Returns the times of the first and the last tick [s].
     pub(crate) fn span(&self) -> Option<[f64; 2]> {
-        Some([self.times.bins().first()?.low, self.times.bins().last()?.high])
+        span(&self.times)
     }
 
     /// Draws the images at three moments, and the curves of the whole run.
     pub(crate) fn page(&self, style: PageStyle) -> String {
         let images = self.images.iter().map(|image| image.page(style));
-        images.chain(self.draw_curves(style, 6)).collect::<Vec<_>>().join("\n")
+        images.chain(self.draw_curves(style, 6, &self.times, |curve| &curve.series)).collect::<Vec<_>>().join("\n")
     }
 
-    /// Draws the first image at present, and then low curves; the most important part comes first.
+    /// Draws the first image at present, and then low curves of the last ten seconds; the most important part comes first.
     pub(crate) fn live(&self, style: PageStyle) -> Vec<String> {
         let image = self.images.first().map(|image| image.now(style));
-        image.into_iter().chain(self.draw_curves(style, 3)).collect()
+        image.into_iter().chain(self.draw_curves(style, 3, &self.recent_times, |curve| &curve.recent)).collect()
     }
 
-    /// Draws the curves, at most `max_height` lines high, above a time axis.
-    fn draw_curves(&self, style: PageStyle, max_height: usize) -> Option<String> {
-        let [first, last] = self.span().filter(|_| !self.curves.is_empty())?;
+    /// Draws one series of each curve, at most `max_height` lines high, above an axis of its times.
+    fn draw_curves(
+        &self,
+        style: PageStyle,
+        max_height: usize,
+        times: &Series,
+        series: fn(&ColumnCurve) -> &Series,
+    ) -> Option<String> {
+        let [first, last] = span(times).filter(|_| !self.curves.is_empty())?;
         let height = match self.curves.len() {
             1 => 6,
             2 => 5,
@@ -114,7 +131,8 @@ impl RunView {
         let tail = (last - first) * TAIL;
         let title = format!("{} over time; mean ± deviation of the last {tail:.3} s", self.plotted.join(", "));
         let mut text = break_at_semicolons(&title, style.width) + "\n";
-        for (ColumnCurve { name, unit, series, .. }, value) in self.curves.iter().zip(&self.row) {
+        for (curve, value) in self.curves.iter().zip(&self.row) {
+            let (ColumnCurve { name, unit, .. }, series) = (curve, series(curve));
             let lines = chart(series.bins(), width, height.min(max_height));
             let values = final_values(*value, &series.tail(TAIL));
             text.push_str(&captioned(&format!("{name} [{unit}]"), &values, &lines, is_narrow));
@@ -125,6 +143,11 @@ impl RunView {
         }
         Some(text)
     }
+}
+
+/// Returns the first and the last time of a series of times [s].
+fn span(times: &Series) -> Option<[f64; 2]> {
+    Some([times.bins().first()?.low, times.bins().last()?.high])
 }
 
 /// Describes the last value, and mean and deviation at the end.
