@@ -5,6 +5,7 @@ mod events;
 mod files;
 mod held;
 mod lateness;
+mod live;
 pub(super) mod log;
 mod ports;
 mod progress;
@@ -19,6 +20,7 @@ use std::path::PathBuf;
 use std::sync::Arc;
 
 use files::OutputFiles;
+use live::{Live, changes};
 use log::NodeLog;
 use progress::Progress;
 use summary::Summary;
@@ -29,9 +31,9 @@ use super::shell::patience::Patience;
 use super::shell::{FAULTED, INTERRUPTED, Shell, unknown};
 use super::text::number::{milliseconds, seconds};
 use super::text::prose::PageStyle;
-use crate::engine::{self, Changer, End, Engine, Interrupt, Outcome, RunOptions, ScheduledChanges};
+use crate::engine::{self, End, Engine, Interrupt, Outcome, RunOptions};
 use crate::fault::Fault;
-use crate::graph::{Compiled, Request, compile};
+use crate::graph::{Compiled, Request};
 use crate::record::PointsRequest;
 use crate::source::{Code, quoted};
 
@@ -103,6 +105,10 @@ pub struct JobOptions {
     /// Read words from standard input during the run, one per line; requires real time
     #[arg(long)]
     pub listen: bool,
+    /// Open no socket, so that `ps`, `get`, `set`, `send` and `watch` do not reach the run; in virtual time there is none
+    #[cfg(unix)]
+    #[arg(long)]
+    pub no_socket: bool,
     /// Record all ports in a .csv or .ndjson file: one row per tick, one column per number; `-` is standard output
     #[arg(short, long, value_name = "FILE")]
     pub out: Option<PathBuf>,
@@ -178,9 +184,10 @@ impl Job {
         let mut warnings = plan.warnings().into_iter().flat_map(|report| report.diagnostics);
         let start = warnings.find(|warning| warning.code == Code::StartOutside).map(|warning| warning.message);
         let silences = plan.silences().to_vec();
+        let facts = self.socket_facts(&plan, is_real);
         let mut engine = Engine::new(plan);
         self.check_words(&engine)?;
-        let mut changes = self.changes(&mut engine, request, shell)?;
+        let changes = changes(self, &mut engine, request, facts.is_some(), shell)?;
         let run = (request, is_real);
         let mut files = match OutputFiles::create(self, chosen.as_ref(), &mut engine, run, &interrupt, shell) {
             Err(message) if interrupt.is_requested() => {
@@ -205,8 +212,9 @@ impl Job {
         let terminal = Some(shell.err()).filter(|_| self.print != Print::Nothing);
         let mut progress = Progress::new(end, terminal, shell.has_colour_on_stderr());
         let (sends, listens) = (send.clone(), *listen);
-        let options =
+        let mut options =
             RunOptions { duration: *duration, is_realtime: *realtime, sends, listens, ..RunOptions::default() };
+        let Live { mut changes, mut socket } = Live::open(changes, facts, &engine, &mut options, shell);
         let outcome = without_panic_messages(|| {
             let mut observe = |engine: &Engine| {
                 summary.add(engine);
@@ -214,6 +222,7 @@ impl Job {
                     log.write(engine);
                 }
                 files.add(engine, &patience);
+                socket.iter_mut().for_each(|socket| socket.publish(engine));
                 progress.show(seconds(engine.now()), engine.ticks(), |style| summary.live(style));
             };
             match &mut changes {
@@ -221,6 +230,7 @@ impl Job {
                 None => engine::run(&mut engine, &options, &mut observe),
             }
         });
+        drop(socket);
         shell.set_patience(&patience.after_run());
         files.end(&engine, &outcome);
         progress.clear();
@@ -259,21 +269,6 @@ impl Job {
         }
         shell.error(format_args!("{fault}; every command went to zero{}", endless_stop(engine, fault)));
         FAULTED
-    }
-
-    /// Schedules the changes of parameters, if there are any.
-    fn changes<'s>(
-        &self,
-        engine: &mut Engine,
-        request: &Request,
-        shell: &'s Shell,
-    ) -> Result<Option<ScheduledChanges<'s>>, String> {
-        if self.options.change.is_empty() {
-            return Ok(None);
-        }
-        let catalogue = shell.catalogue();
-        let changer = Changer::new(engine, request, move |request| compile(catalogue, request).map(drop))?;
-        ScheduledChanges::new(changer, &self.options.change).map(Some)
     }
 
     /// Prints a line unless the run is quiet.
