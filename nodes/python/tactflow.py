@@ -351,10 +351,14 @@ def main(what: Node, arguments: Optional[Sequence[str]] = None) -> None:
     """Runs a node: for tactflow, or alone with ``--test``."""
     parser = argparse.ArgumentParser(description=what.doc.splitlines()[0] if what.doc else what.name)
     parser.add_argument("--test", metavar="FILE", help="run alone on a recording: .npz with one array for each input, or .mcap")
+    parser.add_argument("--pitch", metavar="MM", type=float, default=5.0, help="with --test on .npz: distance between two tactels (default: %(default)s mm)")
+    parser.add_argument("--wire", metavar="INPUT=PORT", action="append", default=[], help="with --test on .mcap: port of an input, where several have its name")
     parsed = parser.parse_args(arguments)
     try:
         if parsed.test:
-            _test(what, parsed.test)
+            wires = dict(wire.partition("=")[::2] for wire in parsed.wire)
+            recorded = parsed.test.endswith(".mcap")
+            _test(what, _recorded_inputs(what, parsed.test, wires) if recorded else _archived_inputs(what, parsed.test, parsed.pitch * 1e-3))
         else:
             _serve(what)
     except (BrokenPipeError, KeyboardInterrupt):
@@ -387,9 +391,8 @@ def _serve(what: Node) -> None:
         _write(pipe, _frame(number, stamp, _outputs(what.outputs, what.function(**values, **params, **more))))
 
 
-def _test(what: Node, path: str) -> None:
+def _test(what: Node, inputs: Dict[str, List[Any]]) -> None:
     """Prints the outputs for each frame of a recording, and how long the function takes."""
-    inputs = _test_inputs(what, path)
     count = min(len(values) for values in inputs.values())
     params = {name: default for name, (default, _) in what.params.items()}
     times = []
@@ -406,25 +409,43 @@ def _test(what: Node, path: str) -> None:
         print(f"{count} frames; {middle:.3f} ms each, and {late:.3f} ms for the slowest in a hundred")
 
 
-def _test_inputs(what: Node, path: str) -> Dict[str, List[Any]]:
-    if path.endswith(".mcap"):
-        recording = open(path)
-        arrays = {name: recording[_only_port(recording, name)].values for name in what.inputs}
-    else:
-        archive = np.load(path)
-        missing = [name for name in what.inputs if name not in archive.files]
-        if missing:
-            raise SystemExit(f"{path} has no array {missing}; it has {archive.files}")
-        arrays = {name: archive[name] for name in what.inputs}
-    frames = lambda port, values: [Frame(np.asarray(one, np.float32), (0.005, 0.005)) for one in values] if port.kind == "image" else list(values)  # noqa: E731
-    return {name: frames(port, arrays[name]) for name, port in what.inputs.items()}
+def _archived_inputs(what: Node, path: str, pitch: float) -> Dict[str, List[Any]]:
+    """Reads the inputs from arrays by their names. An image is in the unit that the node states."""
+    archive = np.load(path)
+    missing = [name for name in what.inputs if name not in archive.files]
+    if missing:
+        raise SystemExit(f"{path} has no array {missing}; it has {archive.files}")
+
+    def value(port: Port, one: Any) -> Any:
+        return Frame(np.asarray(one, np.float32), (pitch, pitch), port.unit or "raw") if port.kind == "image" else one
+
+    return {name: [value(port, one) for one in archive[name]] for name, port in what.inputs.items()}
 
 
-def _only_port(recording: "Recording", name: str) -> str:
-    fitting = [port for port in recording if port == name or port.endswith("." + name)]
-    if len(fitting) != 1:
-        raise SystemExit(f"the recording has {len(fitting)} ports `{name}`: {sorted(recording)}")
-    return fitting[0]
+def _recorded_inputs(what: Node, path: str, wires: Dict[str, str]) -> Dict[str, List[Any]]:
+    """Reads the inputs from a recording: for each value of the first one, the newest values of the others."""
+    recording = open(path)
+    series = {name: recording[_only_port(recording, wires.get(name, name), name)] for name in what.inputs}
+    times = next(iter(series.values())).times
+
+    def value(port: Series, at: int) -> Any:
+        if at < 0:
+            return None
+        one = port.values[at]
+        if port.kind == "image":
+            return Frame(one, port.pitch or (1.0, 1.0), port.units[0], int(round(port.times[at] * 1e9)))
+        return dict(zip(port.columns, (None if np.isnan(part) else part for part in one))) if port.kind == "features" else one
+
+    newest = {name: np.searchsorted(port.times, times, side="right") - 1 for name, port in series.items()}
+    return {name: [value(port, at) for at in newest[name]] for name, port in series.items()}
+
+
+def _only_port(recording: "Recording", name: str, of: str) -> str:
+    fitting = [port for port in recording if port == name] or [port for port in recording if port.endswith("." + name)]
+    if len(fitting) == 1:
+        return fitting[0]
+    known = ", ".join(sorted(fitting or recording))
+    raise SystemExit(f"the recording has {len(fitting) or 'no'} ports `{name}`: write `--wire {of}=PORT` with one of {known}")
 
 
 def _shown(result: Any) -> str:
@@ -490,6 +511,8 @@ class Series:
     """Names of the numbers of a row: those of features, and `vx`, `vy`, ... of a twist. Empty texts for a single number."""
     units: List[str]
     """Unit of each number of a row; one for the whole image."""
+    pitch: Optional[Tuple[float, float]] = None
+    """Of an image or a mask: the distance between the centres of two tactels along x and y [m]."""
 
 
 class Recording(Dict[str, Series]):
@@ -522,8 +545,14 @@ def open(path: str) -> Recording:  # noqa: A001
     for name, (about, times, values) in raw.items():
         units = [unit for _, unit in json.loads(about["units"])]
         columns = [part for part, _ in json.loads(about["units"])]
+        size = values[0].get("cell_size")
         recording[name] = Series(
-            np.array(times) * 1e-9, _values(about["kind"], columns, values), about["kind"], columns, units
+            times=np.array(times) * 1e-9,
+            values=_values(about["kind"], columns, values),
+            kind=about["kind"],
+            columns=columns,
+            units=units,
+            pitch=(size["x"], size["y"]) if size else None,
         )
     return recording
 

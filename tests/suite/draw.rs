@@ -116,3 +116,24 @@ fn mermaid_and_dot_have_the_same_arrows_as_the_picture() {
     assert_eq!(dot.matches('{').count(), dot.matches('}').count());
     assert!(mermaid.starts_with("---\ntitle: \"graphs/carry.toml\"\n---\n"), "a path may have a colon: {mermaid}");
 }
+
+#[test]
+fn a_recording_is_drawn_with_the_time_of_each_node() {
+    let (_folder, run) = in_new_folder("run.mcap");
+    assert_eq!(say(&["run", "graphs/hybrid.toml", "--for", "2s", "--quiet", "--record", &run]).code, 0);
+    let (plain, timed) = (drawn(&["graphs/hybrid.toml"]), drawn(&[&run]));
+    let (_folder, path) = in_new_folder("picture.svg");
+    fs::write(&path, &timed).unwrap();
+    peer("draw.py", &[&path]);
+    let nodes = outline("graphs/hybrid.toml")["nodes"].as_array().unwrap().len();
+    assert_eq!((plain.matches(" µs, at most ").count(), timed.matches(" µs, at most ").count()), (0, nodes));
+    // The modes are those of the graph.
+    let modes = |file: &str| {
+        let svg = drawn(&[file, "--modes"]);
+        svg.split_once("</title>").unwrap().1.to_owned()
+    };
+    assert_eq!(modes(&run), modes("graphs/hybrid.toml"));
+    let given = say(&["draw", &run, "--set", "nodes.pid.gains.x.kp=3"]);
+    assert_eq!(given.code, 2);
+    assert!(given.err.contains("a recording has its own bench and values"), "{}", given.err);
+}

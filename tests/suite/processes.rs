@@ -86,8 +86,8 @@ fn a_recording_replays_without_the_program() {
 const BROKEN: [(&str, &str); 18] = [
     ("crash", "device `program` failed: it ended: exit status: 1; it said `ZeroDivisionError: the mean of nothing`"),
     ("killed", "it ended: signal: 9 (SIGKILL)"),
-    ("hang", "no answer within 400 ms: it hangs"),
-    ("deaf", "no answer within 400 ms: it hangs"),
+    ("hang", "no answer within 400 ms (`timeout_ms`): it hangs"),
+    ("deaf", "no answer within 400 ms (`timeout_ms`): it hangs"),
     ("flood", "it answers question 3, and 4 was asked"),
     ("size", "output `sum`: the frame is too short for it"),
     ("huge", "it sends a frame of 2147483648 bytes, and a frame of its outputs has at most 9"),
@@ -259,6 +259,24 @@ fn in_real_time_a_tick_waits_for_no_program_and_its_answers_are_young() {
 }
 
 #[test]
+fn what_signature_says_can_be_pasted() {
+    let (folder, out) = in_new_folder("stated.node.toml");
+    // Arguments with a space, with quotes and with a line break.
+    let line = r#"{"tactflow": 1, "name": "odd", "inputs": [{"name": "image", "kind": "image"}], "outputs": [{"name": "is_there", "kind": "flag"}]}"#;
+    let command = ["sh", "-c", "printf '%s\n' \"$1\"; read line", "it's \"here\"\nand there", line];
+    let stated = said(tool(&["signature", "--out", &out, "--"]).args(command));
+    assert_eq!((stated.code, stated.err.as_str()), (0, ""), "{}", stated.out);
+    let (_, block) = stated.out.split_once("use it with\n\n").unwrap();
+    let block: toml::Table = block.parse().unwrap();
+    let pasted = &block["nodes"]["odd"];
+    assert_eq!(pasted["command"], toml::Value::from(command.map(str::to_owned).to_vec()));
+    assert_eq!(pasted["signature"].as_str(), Some("stated.node.toml"));
+    let written = fs::read_to_string(&out).unwrap();
+    assert!(written.parse::<toml::Table>().is_ok(), "{written}");
+    drop(folder);
+}
+
+#[test]
 fn the_python_package_states_runs_and_reads() {
     if !has_python_module("numpy") {
         return;
@@ -292,5 +310,28 @@ fn the_python_package_states_runs_and_reads() {
     read.arg(workspace().join("tests/peers/read_recording.py")).arg(&recording).env("PYTHONPATH", &package);
     let read = said(&mut read);
     assert_eq!((read.code, read.err.as_str()), (0, ""), "{}", read.out);
+    let try_alone = |wires: &[&str]| {
+        let mut alone = Command::new("python3");
+        alone.arg(examples.join("contact.py")).args(["--test", &recording]).args(wires);
+        said(alone.env("PYTHONPATH", &package))
+    };
+    let refused = try_alone(&[]);
+    assert!(
+        refused.code == 1 && refused.err.contains("write `--wire image=PORT` with one of pad.image, "),
+        "{}",
+        refused.err
+    );
+    let tried = try_alone(&["--wire", "image=touch.calibrate.image", "--wire", "region=touch.label.region"]);
+    assert!(tried.code == 0 && tried.err.is_empty(), "{}{}", tried.out, tried.err);
+    assert!(tried.out.lines().last().unwrap().contains(" frames; "), "{}", tried.out);
+    let pressures = tried.out.lines().filter_map(|line| line.rsplit_once("pressure=")?.1.parse::<f64>().ok());
+    let pressures: Vec<f64> = pressures.collect();
+    // The last answer of the run was that to one of the last frames.
+    let script = "import sys, tactflow; print(tactflow.open(sys.argv[1])['contact.pressure'].values[-1])";
+    let mut in_run = Command::new("python3");
+    let in_run = said(in_run.args(["-c", script, &recording]).env("PYTHONPATH", &package));
+    let in_run: f64 = in_run.out.trim().parse().unwrap();
+    let is_there = |pressure: &f64| (pressure - in_run).abs() < 1e-5 * in_run;
+    assert!(pressures.iter().rev().take(3).any(is_there), "{in_run} N/tactel, and {pressures:?}");
     drop(folder);
 }

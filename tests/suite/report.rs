@@ -37,6 +37,27 @@ fn a_run_has_its_summary_its_curves_its_graph_and_its_modes() {
 }
 
 #[test]
+fn a_run_in_real_time_has_the_lateness_of_its_ticks() {
+    let (_folder, run) = in_new_folder("run.mcap");
+    let said = say(&["run", "graphs/hybrid.toml", "--for", "1s", "--realtime", "--record", &run]);
+    assert_eq!(said.code, 0, "{}", said.err);
+    let (code, read, page) = page_of(&[&run]);
+    assert_eq!(code, 0);
+    assert!(read.starts_with("1 4 0\n") && page.contains("class=\"bars\""), "one picture more: {read}");
+    // The same ticks as the run itself has counted.
+    let table = |text: &str| -> Vec<String> {
+        let lines = text.lines().skip_while(|line| !line.starts_with("ticks began late by"));
+        let lines = lines.take_while(|line| !line.starts_with("latest tick"));
+        lines.map(|line| line.split_whitespace().collect::<Vec<_>>().join(" ")).collect()
+    };
+    let own = table(&said.out);
+    assert!(own.len() >= 2 && table(&page) == own, "{own:?} {:?}", table(&page));
+    let latest = said.out.lines().find(|line| line.starts_with("latest tick: ")).expect("no clock is exact");
+    let latest = latest.split(';').next().unwrap();
+    assert!(page.contains(latest), "{latest}");
+}
+
+#[test]
 fn a_scenario_stands_beside_the_paper_and_its_failure_is_the_exit_code() {
     let (code, read, page) = page_of(&["tests/scenarios/slide.toml", "tests/scenarios/missed.toml"]);
     assert_eq!(code, 1);

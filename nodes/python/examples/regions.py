@@ -13,7 +13,7 @@ except ImportError:
 
 @tactflow.node
 def regions(image: Image["N"], threshold: Param["N", "What counts as touched."] = 0.02) -> {
-    "orientation": Scalar["rad", "Angle of the major axis, from +x toward +y."],
+    "orientation": Scalar["rad mod pi", "Angle of the major axis, from +x toward +y."],
     "eccentricity": Scalar["1", "0 for a circle, 1 for a line."],
     "solidity": Scalar["1", "Part of its convex hull that the contact fills."],
 }:

@@ -7,8 +7,8 @@ use std::time::Duration;
 use tactflow_runtime::cli::{Shell, clap, duration};
 
 use super::arguments::{may_replace, write};
-use crate::devices::process::ask_signature;
 use crate::devices::process::signature::{PortText, Signature};
+use crate::devices::process::{ask_signature, in_shell};
 
 /// Write the signature of a program: the ports and parameters with which a graph uses it
 #[derive(clap::Parser)]
@@ -40,13 +40,15 @@ pub(super) fn run(args: SignatureArgs, shell: &Shell) -> Result<u8, u8> {
     // The program runs in the folder of its signature, then as now.
     let folder = args.out.as_deref().and_then(Path::parent).filter(|folder| !folder.as_os_str().is_empty());
     let folder = folder.unwrap_or(Path::new("."));
-    let command = args.command.join(" ");
+    let command = in_shell(&args.command);
     let signature = ask_signature(&args.command, folder, patience);
     let signature = signature.map_err(|why| shell.refuse(format_args!("`{command}`: {why}")))?;
     let out = args.out.clone().unwrap_or_else(|| PathBuf::from(format!("{}.node.toml", signature.name)));
     let refuse = |message: String| shell.refuse(message);
     may_replace(&out, "a signature", |text| Signature::from_toml(text).is_ok()).map_err(refuse)?;
     let text = toml::to_string(&signature).map_err(|error| shell.refuse(error))?;
+    // A line break in an argument would end the comment.
+    let command = command.escape_debug();
     let text = format!("# What `{command}` states of itself; `tactflow signature` writes this file.\n{text}");
     write(&out, &text).map_err(refuse)?;
     shell.say(&summary(&signature, &args.command, &out));
@@ -61,7 +63,8 @@ fn summary(signature: &Signature, command: &[String], out: &Path) -> String {
         if ports.is_empty() { "none".to_owned() } else { ports.join("; ") }
     };
     let file = out.file_name().unwrap_or(out.as_os_str()).to_string_lossy();
-    let words: Vec<String> = command.iter().map(|word| format!("{word:?}")).collect();
+    let [command, file] =
+        [toml::Value::from(command.to_vec()), toml::Value::from(&*file)].map(|value| value.to_string());
     let mut text = format!(
         "{} is written: inputs {}; outputs {}",
         out.display(),
@@ -72,9 +75,8 @@ fn summary(signature: &Signature, command: &[String], out: &Path) -> String {
         if signature.inputs.is_empty() { ("devices", &[][..]) } else { ("nodes", &signature.inputs[..]) };
     let _ = write!(
         text,
-        "\nuse it with\n\n[{section}.{}]\ntype = \"process\"\ncommand = [{}]\nsignature = \"{file}\"",
-        signature.name,
-        words.join(", ")
+        "\nuse it with\n\n[{section}.{}]\ntype = \"process\"\ncommand = {command}\nsignature = {file}",
+        signature.name
     );
     for port in wires {
         let _ = write!(text, "\nin.{} = \"NODE.PORT\"", port.name);

@@ -136,7 +136,13 @@ fn guard(group: u32) -> Option<Child> {
     command.args(["-c", "read line; kill -s KILL -- \"-$0\"", &group.to_string()]);
     command.stdin(Stdio::piped()).stdout(Stdio::null()).stderr(Stdio::null());
     std::os::unix::process::CommandExt::process_group(&mut command, 0);
-    command.spawn().ok()
+    let started = command.spawn();
+    if let Err(error) = &started {
+        tracing::warn!(
+            "cannot start `sh`: {error}; if this tool is killed, the program may go on until its input ends"
+        );
+    }
+    started.ok()
 }
 
 #[cfg(not(unix))]

@@ -28,7 +28,8 @@ use launch::Launch;
 use live::Beside;
 use pad::PadProcess;
 use ports::Ports;
-pub(crate) use session::ask_signature;
+use session::signature_command;
+pub(crate) use session::{ask_signature, in_shell};
 use signature::Signature;
 use stepped::InLockstep;
 
@@ -197,7 +198,7 @@ fn read(params: &Params) -> Result<Signature, Mistakes> {
     let text = String::from_utf8_lossy(&bytes);
     Signature::from_toml(&text).map_err(|why| {
         let message = format!("`{}` is no signature of a program: {why}", shown(&file.path));
-        let help = format!("write it once more with `tactflow signature -- {}`", params.command.join(" "));
+        let help = format!("write it once more with `{}`", signature_command(&params.command));
         Mistake::param("signature", message).help(help).into()
     })
 }

@@ -14,6 +14,9 @@ use super::wire::{self, Frame, Value};
 /// The stamp of a frame of a program that has no clock of its own.
 const NO_CLOCK: i64 = i64::MIN;
 
+/// Most frames that are skipped at once, so that a program that sends without a pause is heard too.
+const MAX_SKIPPED: usize = 1000;
+
 /// A program that is a pad.
 pub(super) struct PadProcess {
     launch: Arc<Launch>,
@@ -54,10 +57,11 @@ impl Live for PadProcess {
                 () = &mut stopped => break,
                 received = tokio::time::timeout(self.launch.timeout, session.frame()) => received,
             };
-            let silent = |_| format!("no frame for {} ms", self.launch.timeout.as_millis());
+            let silent = |_| format!("no frame for {} ms (`timeout_ms`)", self.launch.timeout.as_millis());
             let mut frame = received.map_err(silent)??;
             // The newest one: a program that sends too much must not fill the tick with old frames.
-            while let Some(received) = session.waiting() {
+            for _ in 0..MAX_SKIPPED {
+                let Some(received) = session.waiting() else { break };
                 link.count("skipped frames");
                 match received {
                     Received::Frame(newer) => frame = newer,

@@ -108,15 +108,11 @@ impl Ports {
         inputs.map(shape).collect()
     }
 
-    /// Returns the next question if an input is new: all inputs, with the oldest stamp of those that are new. `now` is
-    /// the stamp of values that were computed from no sample [ns].
+    /// Returns the next question, with all inputs, if there is one. `now` is the stamp of values that were computed from
+    /// no sample [ns].
     pub(super) fn question(&mut self, commands: &Commands, now: i64) -> Option<Question> {
         let ages: Vec<ReportAge> = self.inputs.iter().map(|input| commands.report_age(*input)).collect();
-        let new = ages.iter().zip(&self.seen).filter(|(age, seen)| age.is_present && age.count != **seen);
-        let stamp = new.map(|(age, _)| if age.stamp == i64::MAX { now } else { age.stamp }).min()?;
-        if self.last.is_some_and(|last| stamp <= last) {
-            return None;
-        }
+        let stamp = next_stamp(&ages, &self.seen, self.last, now)?;
         let news = ages.iter().zip(&self.seen).map(|(age, seen)| age.count - seen).max().unwrap_or(1);
         self.skipped = if self.number == 0 { 0 } else { news.saturating_sub(1) };
         self.number += 1;
@@ -152,5 +148,63 @@ impl Ports {
                 (AnyOutput::Image(port), _) => samples.clear(*port, stamp, number),
             }
         }
+    }
+}
+
+/// Returns the stamp of the next question: the oldest of the new inputs that are later than the last question. An input
+/// with a long latency may be older than that. It is new in the question, and neither delays it nor makes it older than
+/// the last one.
+fn next_stamp(ages: &[ReportAge], seen: &[u64], last: Option<i64>, now: i64) -> Option<i64> {
+    let new = ages.iter().zip(seen).filter(|(age, seen)| age.is_present && age.count != **seen);
+    let stamps = new.map(|(age, _)| if age.stamp == i64::MAX { now } else { age.stamp });
+    stamps.filter(|stamp| last.is_none_or(|last| *stamp > last)).min()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const MS: i64 = 1_000_000;
+
+    /// The newest value at a time, of an input with a period and a latency [ms].
+    fn newest(now: i64, [period, latency]: [i64; 2]) -> ReportAge {
+        let number = (now / MS - latency).div_euclid(period);
+        ReportAge { is_present: number >= 0, stamp: number * period * MS, count: (number + 1).max(0) as u64 }
+    }
+
+    /// How many questions there are in 4 s of ticks at 250 Hz, and how many values of each input are new in them.
+    fn asked(inputs: [[i64; 2]; 2]) -> (usize, [usize; 2]) {
+        let (mut seen, mut last, mut questions, mut new) = ([0; 2], None, 0, [0; 2]);
+        for tick in 0..1000 {
+            let now = 4 * tick * MS;
+            let ages = inputs.map(|input| newest(now, input));
+            let Some(stamp) = next_stamp(&ages, &seen, last, now) else { continue };
+            assert!(last.is_none_or(|last| stamp > last), "answers are in the order of their stamps");
+            questions += 1;
+            last = Some(stamp);
+            for i in 0..2 {
+                new[i] += usize::from(ages[i].count != std::mem::replace(&mut seen[i], ages[i].count));
+            }
+        }
+        (questions, new)
+    }
+
+    #[test]
+    fn an_input_with_a_long_latency_delays_no_question() {
+        assert_eq!(asked([[4, 0], [4, 0]]), (1000, [1000, 1000]));
+        // A pad without latency beside a camera at 30 Hz with 50 ms, in either order.
+        assert_eq!(asked([[4, 0], [33, 50]]), (1000, [1000, 120]));
+        assert_eq!(asked([[33, 50], [4, 0]]), (1000, [120, 1000]));
+        // Two slow ones: a question for each value that is later than the last question.
+        let (questions, new) = asked([[20, 0], [20, 13]]);
+        assert!((200..=400).contains(&questions) && new[0] == 200 && new[1] >= 199, "{questions} {new:?}");
+    }
+
+    #[test]
+    fn a_value_of_no_sample_has_the_time_of_the_question() {
+        let timeless = ReportAge { is_present: true, stamp: i64::MAX, count: 1 };
+        assert_eq!(next_stamp(&[timeless], &[0], None, 7), Some(7));
+        assert_eq!(next_stamp(&[timeless], &[0], Some(7), 7), None);
+        assert_eq!(next_stamp(&[timeless], &[1], None, 7), None);
     }
 }

@@ -11,6 +11,17 @@ use super::launch::Launch;
 use super::signature::{Signature, VERSION};
 use super::wire::{self, Frame, Question, Value};
 
+/// Returns the command that writes the signature of a program, to paste into a shell.
+pub(super) fn signature_command(command: &[String]) -> String {
+    format!("tactflow signature -- {}", in_shell(command))
+}
+
+/// Writes a command as a shell reads it.
+pub(crate) fn in_shell(command: &[String]) -> String {
+    // Only a zero byte has no way to be written, and no argument of a process has one.
+    shlex::try_join(command.iter().map(String::as_str)).unwrap_or_else(|_| command.join(" "))
+}
+
 /// A program whose signature agrees.
 pub(super) struct Session {
     program: Program,
@@ -22,10 +33,10 @@ impl Session {
     /// Starts a program, compares its signature with the file, and sends it the shapes of its inputs and its parameters.
     pub(super) async fn start(launch: &Launch, inputs: Vec<Json>) -> Result<Self, String> {
         let mut program = Program::start(launch)?;
-        let stated = receive_signature(&mut program, launch.start).await?;
+        let stated = receive_signature(&mut program, launch.start, "`start_s`").await?;
         if let Some(difference) = launch.signature.differs_from(&stated) {
-            let command = launch.command.join(" ");
-            return Err(format!("{difference}: write the file once more with `tactflow signature -- {command}`"));
+            let command = signature_command(&launch.command);
+            return Err(format!("{difference}: write the file once more with `{command}`"));
         }
         let start = json!({ "tactflow": VERSION, "inputs": inputs, "params": launch.values });
         program.send(format!("{start}\n").into_bytes())?;
@@ -38,7 +49,7 @@ impl Session {
         self.program.send(question.frame())?;
         let frame = match tokio::time::timeout(self.timeout, self.frame()).await {
             Ok(frame) => frame?,
-            Err(_) => return Err(format!("no answer within {} ms: it hangs", self.timeout.as_millis())),
+            Err(_) => return Err(format!("no answer within {} ms (`timeout_ms`): it hangs", self.timeout.as_millis())),
         };
         if (frame.number, frame.stamp) != (number, stamp) {
             let (theirs, ours) = (frame.number, number);
@@ -71,10 +82,11 @@ impl Session {
     }
 }
 
-async fn receive_signature(program: &mut Program, patience: Duration) -> Result<Signature, String> {
+/// Waits for the signature as long as the parameter `param` says.
+async fn receive_signature(program: &mut Program, patience: Duration, param: &str) -> Result<Signature, String> {
     let received = tokio::time::timeout(patience, program.received.recv()).await;
-    let received =
-        received.map_err(|_| format!("it has not stated its signature within {} s", patience.as_secs_f64()))?;
+    let received = received
+        .map_err(|_| format!("it has not stated its signature within {} s ({param})", patience.as_secs_f64()))?;
     match received {
         Some(Received::Line(line)) => Signature::from_line(&line).map_err(|why| {
             let start: String = line.trim_end().chars().take(60).collect();
@@ -110,7 +122,7 @@ pub(crate) fn ask_signature(command: &[String], folder: &Path, patience: Duratio
     let runtime = tokio::runtime::Builder::new_current_thread().enable_time().build();
     let runtime = runtime.map_err(|error| error.to_string())?;
     let mut program = Program::start(&launch)?;
-    let signature = runtime.block_on(receive_signature(&mut program, patience))?;
+    let signature = runtime.block_on(receive_signature(&mut program, patience, "`--for`"))?;
     program.dismiss();
     Ok(signature)
 }

@@ -1,5 +1,7 @@
 //! What a program states of itself: its ports, its parameters, their units and their documentation.
 
+use std::collections::BTreeSet;
+
 use serde::{Deserialize, Serialize};
 use tactflow_runtime::signal::{FeaturesShape, ImageShape, Kind, Unit};
 
@@ -109,18 +111,10 @@ impl Signature {
 
     /// Checks what a wrong text can state.
     fn check(&self) -> Result<(), String> {
-        let (mut inputs, mut outputs) = (Vec::new(), Vec::new());
-        for (ports, seen) in [(&self.inputs, &mut inputs), (&self.outputs, &mut outputs)] {
-            for port in ports {
-                is_name(&port.name)?;
-                if seen.contains(&&port.name) {
-                    return Err(format!("two ports have the name `{}`", port.name));
-                }
-                seen.push(&port.name);
-            }
-        }
+        names(self.inputs.iter().map(|port| &port.name), "inputs")?;
+        names(self.outputs.iter().map(|port| &port.name), "outputs")?;
+        names(self.params.iter().map(|param| &param.name), "parameters")?;
         for param in &self.params {
-            is_name(&param.name)?;
             if !param.default.is_finite() {
                 return Err(format!("the default of `{}` is not a finite number", param.name));
             }
@@ -190,8 +184,28 @@ impl PortText {
             let known: Vec<String> = KINDS.iter().map(|kind| format!("`{}`", kind.name())).collect();
             format!("the kind of input `{}` is `{}`, and not one of {}", self.name, self.kind, known.join(", "))
         })?;
+        let has_unit = kind.arguments().contains(&"unit") && kind != Kind::Features;
+        self.has_only("input", if has_unit { &["unit"] } else { &[] })?;
         self.unit.as_deref().map_or(Ok(()), |unit| parse(&self.name, unit).map(drop))?;
         Ok(kind)
+    }
+
+    /// Refuses a key that means nothing for a port of this kind.
+    fn has_only(&self, direction: &str, known: &[&str]) -> Result<(), String> {
+        let stated = [
+            ("unit", self.unit.is_some()),
+            ("rows", self.rows.is_some()),
+            ("cols", self.cols.is_some()),
+            ("pitch", self.pitch.is_some()),
+            ("features", !self.features.is_empty()),
+        ];
+        match stated.iter().find(|(key, is_stated)| *is_stated && !known.contains(key)) {
+            Some((key, _)) => {
+                let Self { name, kind, .. } = self;
+                Err(format!("`{key}` means nothing for the {direction} `{name}`, which is of kind `{kind}`: remove it"))
+            }
+            None => Ok(()),
+        }
     }
 
     /// Returns what an output carries.
@@ -202,14 +216,22 @@ impl PortText {
             parse(name, unit)
         };
         match &*self.kind {
+            "scalar" => self.has_only("output", &["unit"])?,
+            "flag" => self.has_only("output", &[])?,
+            "features" => self.has_only("output", &["features"])?,
+            "image" => self.has_only("output", &["unit", "rows", "cols", "pitch"])?,
+            _ => {}
+        }
+        match &*self.kind {
             "scalar" => unit().map(OutputShape::Scalar),
             "flag" => Ok(OutputShape::Flag),
             "features" if self.features.is_empty() => Err(format!("output `{name}` names no `features`")),
             "features" => {
-                let units = self.features.iter().map(|feature| {
-                    is_name(&feature.name)?;
-                    Ok((feature.name.as_str(), parse(&feature.name, &feature.unit)?))
-                });
+                names(self.features.iter().map(|feature| &feature.name), "features")?;
+                let units = self
+                    .features
+                    .iter()
+                    .map(|feature| Ok((feature.name.as_str(), parse(&feature.name, &feature.unit)?)));
                 let units: Result<Vec<_>, String> = units.collect();
                 Ok(OutputShape::Features(FeaturesShape::new(units?)))
             }
@@ -258,6 +280,18 @@ fn parse(name: &str, unit: &str) -> Result<Unit, String> {
     unit.parse().map_err(|why| format!("the unit of `{name}`: {why}"))
 }
 
+/// Checks names of one kind of thing: each is valid, and no two are the same.
+fn names<'n>(names: impl Iterator<Item = &'n String>, what: &str) -> Result<(), String> {
+    let mut seen = BTreeSet::new();
+    for name in names {
+        is_name(name)?;
+        if !seen.insert(name) {
+            return Err(format!("two {what} have the name `{name}`"));
+        }
+    }
+    Ok(())
+}
+
 fn is_name(name: &str) -> Result<(), String> {
     let is_right = name.starts_with(|c: char| c.is_ascii_lowercase())
         && name.chars().all(|c| c.is_ascii_lowercase() || c.is_ascii_digit() || c == '_');
@@ -265,4 +299,45 @@ fn is_name(name: &str) -> Result<(), String> {
         return Ok(());
     }
     Err(format!("`{name}` is not a valid name: it has lower-case letters, digits and `_`, and starts with a letter"))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn each_mistake_in_a_signature_is_named() {
+        let whole = |input: &str, output: &str, params: &str| {
+            Signature::from_line(&format!(
+                r#"{{"tactflow":1,"name":"a","inputs":[{{"name":"i",{input}}}],"outputs":[{{"name":"o",{output}}}],"params":[{params}]}}"#
+            ))
+        };
+        let (image, metres) = (r#""kind":"image""#, r#""kind":"scalar","unit":"m""#);
+        assert!(whole(image, metres, "").is_ok());
+        let (x, part) = (r#"{"name":"x","default":1}"#, r#"{"name":"b","unit":"m"}"#);
+        for (found, why) in [
+            (whole(image, metres, &format!("{x},{x}")), "two parameters have the name `x`"),
+            (
+                whole(image, &format!(r#""kind":"features","features":[{part},{part}]"#), ""),
+                "two features have the name `b`",
+            ),
+            (
+                whole(image, r#""kind":"flag","unit":"m""#, ""),
+                "`unit` means nothing for the output `o`, which is of kind `flag`",
+            ),
+            (whole(image, &format!(r#"{metres},"rows":3"#), ""), "`rows` means nothing for the output `o`"),
+            (whole(&format!(r#"{image},"cols":3"#), metres, ""), "`cols` means nothing for the input `i`"),
+            (
+                whole(r#""kind":"mask","unit":"N""#, metres, ""),
+                "`unit` means nothing for the input `i`, which is of kind `mask`",
+            ),
+            (whole(r#""kind":"pose""#, metres, ""), "the kind of input `i` is `pose`, and not one of `scalar`"),
+            (whole(image, r#""kind":"scalar""#, ""), "output `o` has no `unit`"),
+            (whole(image, r#""kind":"twist","unit":"m/s""#, ""), "no motion of an arm"),
+            (whole(image, metres, r#"{"name":"X","default":1}"#), "`X` is not a valid name"),
+        ] {
+            let said = found.unwrap_err();
+            assert!(said.contains(why), "{said}");
+        }
+    }
 }

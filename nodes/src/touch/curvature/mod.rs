@@ -34,9 +34,10 @@ use curve::{Axes, Curve, curve};
 /// which also follows a line whose bend changes within the region. A cubic is noisier: the standard deviation of its
 /// direction is 2.5 times that of a parabola over the same length.
 ///
-/// `turn` is κ L: the angle between the two ends of the line, for a length L. `length` L is that of a uniform bar with
-/// the same standard deviation σ along the axis, sqrt(12) σ. The curvature is `turn` / `length`. For an arc of radius R
-/// it is too large by the fraction 0.054 (L/R)².
+/// `turn` is κ L for a length L: the angle between the two ends of an arc. A line whose bend changes, which `degree = 3`
+/// follows, can turn by another angle from end to end. `length` L is that of a uniform bar with the same standard
+/// deviation σ along the axis, sqrt(12) σ. The curvature is `turn` / `length`. For an arc of radius R it is too large by
+/// the fraction 0.054 (L/R)².
 ///
 /// v is the part of `in.twist` along the line: wire the guidance that moves the sensor. Without this wire, and while
 /// the twist is absent, `rate` is absent.
@@ -112,8 +113,8 @@ pub struct Outputs {
     /// `min_anisotropy`.
     #[port(unit = "rad mod pi", frame = "A", quantity = "orientation")]
     orientation: Out<Scalar>,
-    /// Angle by which the line turns over its length, from +x toward +y on the way along its axis; absent if it is no
-    /// line.
+    /// Curvature times length: the angle by which an arc turns, from +x toward +y on the way along its axis; absent if it
+    /// is no line.
     #[port(unit = "rad", frame = "A", quantity = "turn")]
     turn: Out<Scalar>,
     /// Length of the line; absent if it is no line.

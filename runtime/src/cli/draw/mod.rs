@@ -5,12 +5,17 @@ mod layout;
 mod mermaid;
 mod modes;
 mod picture;
+#[cfg(feature = "mcap")]
+mod recorded;
 mod svg;
 mod wires;
 
+use std::collections::HashMap;
 use std::path::PathBuf;
 
 use clap::ValueEnum;
+
+use picture::Picture;
 
 use super::shell::Shell;
 use super::shell::command::GraphArgs;
@@ -21,16 +26,18 @@ use crate::graph::{Outline, PlannedPort, compile};
 #[command(
     name = "draw",
     after_help = "The picture goes to the standard output. Each wire has its port, its kind, its unit and its frames. Dashed
-arrows between modes are `fail` and `on_lost`.
+arrows between modes are `fail` and `on_lost`. In the place of a graph, a recording (.mcap) shows the graph that ran, with
+the time of each node, measured on this machine while the recording is replayed.
 
 Examples:
   tactflow draw graphs/hybrid.toml > hybrid.svg
   tactflow draw graphs/hybrid.toml --modes > modes.svg
+  tactflow draw run.mcap > times.svg
   tactflow draw graphs/hybrid.toml --format mermaid     for a Markdown page
   tactflow draw graphs/hybrid.toml --format dot | dot -Tpdf > hybrid.pdf"
 )]
 pub(crate) struct DrawArgs {
-    /// The graph file
+    /// The graph file, or a recording of a run (.mcap)
     graph: PathBuf,
     #[command(flatten)]
     graph_args: GraphArgs,
@@ -61,7 +68,7 @@ pub(crate) fn graph_svg<'p>(
     ports: impl Iterator<Item = &'p PlannedPort>,
     title: String,
 ) -> String {
-    svg::text(&wires::picture(outline, ports, title))
+    svg::text(&wires::picture(outline, ports, &HashMap::new(), title))
 }
 
 /// Returns the picture of the modes of a graph, as SVG.
@@ -70,15 +77,10 @@ pub(crate) fn modes_svg(outline: &Outline, title: String) -> String {
 }
 
 pub(crate) fn draw(args: DrawArgs, shell: &Shell) -> u8 {
-    let plan = match compile(shell.catalogue(), &args.graph_args.request(args.graph.clone())) {
-        Ok(plan) => plan,
-        Err(report) => return shell.reject(&report),
-    };
-    let title = args.graph.display().to_string();
-    let mut picture = match args.modes {
-        true if plan.outline().modes.is_empty() => return shell.refuse("the graph has no modes to draw"),
-        true => modes::picture(plan.outline(), title),
-        false => wires::picture(plan.outline(), plan.ports(), title),
+    let mut picture = match picture(&args, shell) {
+        Ok(picture) if picture.boxes.is_empty() && args.modes => return shell.refuse("the graph has no modes to draw"),
+        Ok(picture) => picture,
+        Err(code) => return code,
     };
     if args.plain {
         picture.arrows.iter_mut().for_each(|arrow| arrow.lines.clear());
@@ -90,4 +92,18 @@ pub(crate) fn draw(args: DrawArgs, shell: &Shell) -> u8 {
     };
     shell.say(text.trim_end());
     0
+}
+
+fn picture(args: &DrawArgs, shell: &Shell) -> Result<Picture, u8> {
+    #[cfg(feature = "mcap")]
+    if recorded::is_recording(&args.graph) {
+        return recorded::picture(args, shell);
+    }
+    let request = args.graph_args.request(args.graph.clone());
+    let plan = compile(shell.catalogue(), &request).map_err(|report| shell.reject(&report))?;
+    let title = args.graph.display().to_string();
+    Ok(match args.modes {
+        true => modes::picture(plan.outline(), title),
+        false => wires::picture(plan.outline(), plan.ports(), &HashMap::new(), title),
+    })
 }

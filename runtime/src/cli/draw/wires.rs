@@ -6,10 +6,12 @@ use super::picture::{Look, Picture};
 use crate::graph::{Outline, OutlinedWire, PlannedPort};
 use crate::signal::Shape;
 
-/// Returns the picture of a graph as it runs. A role that is read and commanded has a box for each.
+/// Returns the picture of a graph as it runs, with the time of each node if it is known. A role that is read and commanded
+/// has a box for each.
 pub(super) fn picture<'p>(
     outline: &'p Outline,
     ports: impl Iterator<Item = &'p PlannedPort>,
+    times: &HashMap<String, String>,
     title: String,
 ) -> Picture {
     let ports = ports.map(|port| (port.name.as_str(), port)).collect();
@@ -19,7 +21,8 @@ pub(super) fn picture<'p>(
         let (part, name) = node.name.rsplit_once('.').unwrap_or(("", &node.name));
         let group = drawing.picture.group(part);
         let kind = Some(&node.kind.text).filter(|kind| *kind != name).cloned();
-        let lines = [name.to_owned()].into_iter().chain(kind).collect();
+        let time = times.get(&node.name).cloned();
+        let lines = [name.to_owned()].into_iter().chain(kind).chain(time).collect();
         let number = drawing.picture.add(lines, Look::Inner, group);
         drawing.sources.insert(node.name.clone(), number);
         nodes.push(number);

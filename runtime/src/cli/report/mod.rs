@@ -1,5 +1,6 @@
 //! `report`: recordings and scenarios as one page for a browser, with everything in it.
 
+mod lateness;
 mod page;
 mod run;
 
@@ -18,7 +19,7 @@ use crate::recording::{Replay, ReplayChanges, ReplayError};
     after_help = "The page goes to the standard output. It is one file: it loads nothing, and prints well.
 
 A recording is replayed: the page has what `run` prints, the image and the curves of the ports that the graph
-shows, its modes and the graph. A scenario runs, and its results stand beside those of the paper.
+shows, how late its ticks began in real time, its modes and the graph. A scenario runs, and its results stand beside those of the paper.
 
 Examples:
   tactflow run graphs/hybrid.toml --record run.mcap

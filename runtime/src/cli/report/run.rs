@@ -2,6 +2,7 @@
 
 use std::time::Instant;
 
+use super::lateness::Lateness;
 use super::page::HtmlPage;
 use crate::cli::draw::{graph_svg, modes_svg};
 use crate::cli::run::summary::Summary;
@@ -19,6 +20,7 @@ pub(super) fn add(page: &mut HtmlPage, name: &str, mut replay: Replay) -> Result
     let mut summary = Summary::new(replay.engine(), false, None).without_hint();
     // A graph that shows nothing has no picture.
     let mut still = Still::new(name, replay.engine()).ok();
+    let mut lateness = Lateness::default();
     let fault = without_panic_messages(|| {
         loop {
             match replay.step()? {
@@ -28,6 +30,7 @@ pub(super) fn add(page: &mut HtmlPage, name: &str, mut replay: Replay) -> Result
             }
             summary.add(replay.engine());
             still.iter_mut().for_each(|still| still.add(replay.engine()));
+            lateness.add(replay.engine());
         }
     })?;
     let engine = replay.engine();
@@ -40,6 +43,9 @@ pub(super) fn add(page: &mut HtmlPage, name: &str, mut replay: Replay) -> Result
     page.listing(&summary.render(engine, &outcome, style));
     if let Some(still) = still {
         page.picture(&still.text(engine), "The strongest image, and what the graph shows over time.");
+    }
+    if let Some(caption) = lateness.caption() {
+        page.picture(&lateness.picture(), &caption);
     }
     add_graph(page, name, &replay, engine);
     Ok(difference(&replay))

@@ -6,7 +6,8 @@
 //! | tag | item | bytes |
 //! |---|---|---|
 //! | `W` | an operator word before the tick | text |
-//! | `T` | the tick begins | u64 number, i64 time \[ns\], i64 lateness \[ns\] or 0 |
+//! | `T` | the tick begins | u64 number, i64 time \[ns\], i64 lateness \[ns\] if it is a trouble, or 0 |
+//! | `B` | in real time: how late the tick began | i64 lateness \[ns\] |
 //! | `V` | a parameter of `[live]` takes a value in the tick | f64 value, f64 value toward which it moves, text name |
 //! | `X` | the devices were asked | u8: whether the clock device has sampled |
 //! | `R` | the commands of a device were set to zero, because its driver has ended | u16 device |
@@ -26,6 +27,7 @@ use crate::signal::put_text;
 /// The tags of the items.
 pub(super) const WORD: u8 = b'W';
 pub(super) const TICK: u8 = b'T';
+pub(super) const BEGAN: u8 = b'B';
 pub(super) const VALUE: u8 = b'V';
 pub(super) const EXCHANGE: u8 = b'X';
 pub(super) const REST: u8 = b'R';
@@ -116,14 +118,18 @@ impl InputLog {
         put_text(&mut self.bytes, word);
     }
 
-    /// Logs the beginning of a tick.
-    pub(super) fn begin(&mut self, tick: &Tick, late: Option<i64>) {
+    /// Logs the beginning of a tick: how late it is if that is a trouble, and how late it is in real time [ns].
+    pub(super) fn begin(&mut self, tick: &Tick, late: Option<i64>, by: Option<i64>) {
         self.renew();
         (self.has_begun, self.tick) = (true, (tick.index, tick.now));
         self.bytes.push(TICK);
         self.bytes.extend_from_slice(&tick.index.to_le_bytes());
         self.bytes.extend_from_slice(&tick.now.to_le_bytes());
         self.bytes.extend_from_slice(&late.unwrap_or(0).to_le_bytes());
+        if let Some(by) = by {
+            self.bytes.push(BEGAN);
+            self.bytes.extend_from_slice(&by.to_le_bytes());
+        }
     }
 
     /// Logs that a parameter takes a value, on its way to another one.

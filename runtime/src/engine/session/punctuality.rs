@@ -52,6 +52,8 @@ impl TickUse {
 pub struct Punctuality {
     /// The last tick.
     pub(super) last: Option<Beginning>,
+    /// How late it began [ns].
+    pub(super) last_by: i64,
     /// Number of ticks by their lateness: below each of [`BOUNDS_NS`](Self::BOUNDS_NS), and above the last.
     pub counts: [u64; Self::BOUNDS_NS.len() + 1],
     /// The tick that was latest.
@@ -81,7 +83,13 @@ impl Punctuality {
         if by > self.worst.by {
             self.worst = LateTick { time: began.time, by, cause };
         }
-        self.last = Some(began);
+        (self.last, self.last_by) = (Some(began), by);
+    }
+
+    /// Returns how late the last tick began [ns]; `None` in virtual time.
+    #[must_use]
+    pub fn by(&self) -> Option<i64> {
+        self.last.map(|_| self.last_by)
     }
 
     /// Notes how long a device took in this tick.

@@ -1,7 +1,8 @@
 //! Replays the inputs of a recording: writes the samples of the devices, sends the words and runs the tick.
 
 use super::engine::Engine;
-use super::inputs::{EXCHANGE, FAILURE, InputLog, LEASE, PORT, REST, STATES, TICK, VALUE, WORD};
+use super::inputs::{BEGAN, EXCHANGE, FAILURE, InputLog, LEASE, PORT, REST, STATES, TICK, VALUE, WORD};
+use super::punctuality::Beginning;
 use crate::device::{RecordedDevice, SampleState};
 use crate::engine::core::{DeviceLink, DeviceSlot};
 use crate::fault::Fault;
@@ -57,10 +58,11 @@ impl Engine {
     /// Returns a message if the bytes are no inputs of these devices.
     pub fn replay(&mut self, inputs: &[u8]) -> Result<Result<(), Fault>, String> {
         let mut reader = ByteReader(inputs);
-        let (mut now, mut has_sampled, mut values) = (None, false, Vec::new());
+        let (mut now, mut began, mut has_sampled, mut values) = (None, None, false, Vec::new());
         while !reader.0.is_empty() {
             match self.apply(&mut reader) {
                 Some(Item::Tick(time)) => now = Some(time),
+                Some(Item::Began(by)) => began = Some(by),
                 Some(Item::Exchange(has)) => has_sampled = has,
                 Some(Item::Value(name, value)) => values.push((name, value)),
                 Some(Item::Device) => {}
@@ -69,6 +71,9 @@ impl Engine {
         }
         let Some(now) = now else { return Err("the inputs contain no tick".into()) };
         self.live.replay(&values)?;
+        if let Some(by) = began {
+            self.punctuality.count(Beginning { time: now.saturating_add(by), wall: 0 }, by, None);
+        }
         self.replayed = Some(has_sampled);
         Ok(self.tick(now))
     }
@@ -92,6 +97,7 @@ impl Engine {
                 }
                 Some(Item::Tick(now))
             }
+            BEGAN => reader.i64().filter(|by| is_time(*by) && *by >= 0).map(Item::Began),
             VALUE => {
                 let value = [reader.u64()?, reader.u64()?].map(f64::from_bits);
                 let is_finite = value.iter().all(|number| number.is_finite());
@@ -141,6 +147,8 @@ const fn is_time(nanos: i64) -> bool {
 enum Item {
     /// The time of the tick [ns].
     Tick(i64),
+    /// How late it began in real time [ns].
+    Began(i64),
     /// Whether the clock device has sampled.
     Exchange(bool),
     /// A parameter, its value and the value toward which it moves.
