@@ -30,7 +30,7 @@ pub(crate) fn watched() -> [f64; 3] {
         sockets.push(open(engine, RunFacts::of(&plan, &request.graph, true)).expect("there is a folder for sockets"));
     }
     // The socket of a process has one name, which is that of the last one.
-    let path = sockets[1].0.path().to_owned();
+    let path = sockets[1].socket.path().to_owned();
     let _stuck: Vec<UnixStream> = (0..2).map(|_| watcher(&path)).collect();
     for client in (0..3).map(|_| watcher(&path)) {
         std::thread::spawn(move || BufReader::new(client).lines().map_while(Result::ok).for_each(drop));
@@ -48,8 +48,8 @@ pub(crate) fn watched() -> [f64; 3] {
                 // Joints that are commanded and do not move are a fault after a while, which changes nothing here.
                 let _ = black_box(&mut *engine).step();
                 recorder.iter_mut().for_each(|recorder| recorder.record(engine, || false));
-                if let Some((_, feed, ..)) = i.checked_sub(1).map(|socket| &mut sockets[socket]) {
-                    feed.publish(engine);
+                if let Some(opened) = i.checked_sub(1).map(|socket| &mut sockets[socket]) {
+                    opened.feed.publish(engine);
                 }
             }
             times.push(begin.elapsed().as_nanos() as f64 / f64::from(TICKS));

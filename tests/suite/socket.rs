@@ -1,111 +1,22 @@
 //! A graph that runs is reached from other processes: it shows its values, changes, stops, and is delayed by nobody.
 
+mod session;
+
 use std::io::{BufRead, BufReader, Read, Write};
 use std::os::unix::fs::PermissionsExt;
 use std::os::unix::net::UnixStream;
 use std::path::PathBuf;
-use std::process::{Child, Command, Stdio};
-use std::time::{Duration, Instant};
+use std::process::Command;
 
 use serde_json::{Value, json};
 use tactflow_runtime::random::Random;
 use tactflow_tests::workspace;
 use tempfile::TempDir;
 
-use crate::tool::{Said, said, tool};
+use crate::tool::said;
+use session::{PATIENCE, Session, finish, wait_for};
 
 const KP: &str = "pid.gains.y.kp";
-/// Longest wait for a process or an answer.
-const PATIENCE: Duration = Duration::from_secs(20);
-
-/// A user's session: the folder of the sockets, and the graphs that run.
-struct Session {
-    folder: TempDir,
-    runs: Vec<Child>,
-}
-
-impl Session {
-    fn new() -> Self {
-        Self { folder: tempfile::tempdir().unwrap(), runs: Vec::new() }
-    }
-
-    fn tool(&self, args: &[&str]) -> Command {
-        let mut command = tool(args);
-        command.env("XDG_RUNTIME_DIR", self.folder.path());
-        command
-    }
-
-    fn say(&self, args: &[&str]) -> Said {
-        said(&mut self.tool(args))
-    }
-
-    /// Runs a command that must succeed, and returns what it prints.
-    fn print(&self, args: &[&str]) -> String {
-        let said = self.say(args);
-        assert_eq!(said.code, 0, "{args:?}: {}{}", said.out, said.err);
-        said.out
-    }
-
-    /// Starts a graph in real time, and waits for its socket. Returns the number of its process.
-    fn run(&mut self, args: &[&str]) -> u32 {
-        let mut command = self.tool(&[&["run"], args, &["--realtime"]].concat());
-        let child = command.stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
-        let pid = child.id();
-        self.runs.push(child);
-        wait_for(|| self.socket(pid).exists().then_some(()), "the socket");
-        pid
-    }
-
-    fn socket(&self, pid: u32) -> PathBuf {
-        self.folder.path().join(format!("tactflow/{pid}.sock"))
-    }
-
-    /// Ends the first graph as Ctrl-C does, and returns what it has said.
-    fn end(&mut self) -> Said {
-        let child = self.runs.remove(0);
-        let pid = nix::unistd::Pid::from_raw(child.id().try_into().unwrap());
-        nix::sys::signal::kill(pid, nix::sys::signal::Signal::SIGINT).unwrap();
-        finish(child)
-    }
-
-    fn connect(&self, pid: u32) -> BufReader<UnixStream> {
-        let stream = UnixStream::connect(self.socket(pid)).unwrap();
-        stream.set_read_timeout(Some(PATIENCE)).unwrap();
-        BufReader::new(stream)
-    }
-
-    fn about(&self) -> Value {
-        let all: Value = serde_json::from_str(&self.print(&["ps", "--format", "json"])).unwrap();
-        all[0].clone()
-    }
-}
-
-impl Drop for Session {
-    fn drop(&mut self) {
-        for mut child in self.runs.drain(..) {
-            let _ = child.kill();
-            let _ = child.wait();
-        }
-    }
-}
-
-fn finish(child: Child) -> Said {
-    let output = child.wait_with_output().unwrap();
-    let text = |bytes: Vec<u8>| String::from_utf8(bytes).unwrap();
-    Said { code: output.status.code().unwrap_or(-1), out: text(output.stdout), err: text(output.stderr) }
-}
-
-fn wait_for<T>(mut look: impl FnMut() -> Option<T>, what: &str) -> T {
-    let begin = Instant::now();
-    loop {
-        if let Some(found) = look() {
-            return found;
-        }
-        assert!(begin.elapsed() < PATIENCE, "no {what}");
-        std::thread::sleep(Duration::from_millis(20));
-    }
-}
-
 /// Sends a line, and returns the answer.
 fn ask(client: &mut BufReader<UnixStream>, line: &str) -> Value {
     client.get_mut().write_all(format!("{line}\n").as_bytes()).unwrap();
@@ -198,7 +109,8 @@ fn a_gain_is_changed_within_its_range_and_the_summary_says_so() {
 #[test]
 fn only_words_that_stop_are_sent() {
     let mut session = Session::new();
-    session.run(&["graphs/hybrid.toml", "--listen"]);
+    let recording = session.folder.path().join("run.mcap").display().to_string();
+    session.run(&["graphs/hybrid.toml", "--listen", "--record", &recording]);
     wait_for(|| (session.about()["tasks"][0]["mode"] == json!("servo")).then_some(()), "mode servo");
     let resume = session.say(&["send", "resume"]);
     assert!(resume.code == 2 && resume.err.contains("`resume` can start a motion"), "{}", resume.err);
@@ -211,8 +123,18 @@ fn only_words_that_stop_are_sent() {
     // The terminal of the run resumes.
     session.runs[0].stdin.as_mut().unwrap().write_all(b"resume\n").unwrap();
     wait_for(|| (!halted(&session)).then_some(()), "end of the halt");
+    session.print(&["set", "pid.gains.y.kp=4"]);
+    wait_for(|| session.print(&["get", KP]).contains(" 4 ").then_some(()), "end of the change");
     let end = session.end();
     assert!(end.out.contains("the operator sent `stop`"), "{}", end.out);
+    // What came over the socket is in the recording, and comes again.
+    let replay = session.say(&["replay", &recording]);
+    assert!(
+        replay.code == 0 && replay.out.contains("`pid.gains.y.kp` changed from 4.5 to 4"),
+        "{}{}",
+        replay.out,
+        replay.err
+    );
 }
 
 #[test]
@@ -234,8 +156,9 @@ fn a_watcher_gets_what_the_table_of_the_run_contains() {
         let sample: Value = serde_json::from_str(line).unwrap();
         assert!(sample.get("lost").is_none(), "{line}");
         let time = sample["t"].as_f64().unwrap();
-        let row =
-            rows.iter().find(|row| row[0].parse::<f64>() == Ok(time)).unwrap_or_else(|| panic!("no row at {time}"));
+        // The table has a row for each tick, with the time at which the tick really began.
+        let row = &rows[(time / 0.004).round() as usize];
+        assert!((row[0].parse::<f64>().unwrap() - time).abs() < 0.5, "{} and {time}", row[0]);
         for (name, column) in columns {
             let Some(value) = sample.get(name) else { continue };
             assert_eq!(value.as_f64(), row[column].parse::<f64>().ok(), "{name} at {time}");

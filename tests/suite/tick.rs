@@ -12,7 +12,7 @@ use tactflow_runtime::graph::{Request, compile};
 use tactflow_runtime::record::OutputFile;
 use tactflow_runtime::recording::{RecordRequest, RunRecorder};
 #[cfg(unix)]
-use tactflow_runtime::socket::{Feed, RunFacts, RunSocket};
+use tactflow_runtime::socket::{Feed, OpenedSocket, RunFacts, RunSocket};
 use tactflow_tests::examples::graph_of_all;
 use tactflow_tests::{catalogue, shipped_graphs, workspace};
 
@@ -112,7 +112,7 @@ impl Watched {
         let plan =
             compile(&catalogue(), &Request::file(workspace().join("graphs/hybrid.toml"))).unwrap_or_else(|_| panic!());
         let facts = RunFacts::of(&plan, Path::new("graphs/hybrid.toml"), true);
-        let (socket, feed, ..) = tactflow_runtime::socket::open(engine, facts).unwrap();
+        let OpenedSocket { socket, feed, .. } = tactflow_runtime::socket::open(engine, facts).unwrap();
         let path = socket.path().to_owned();
         let mut watcher = BufReader::new(UnixStream::connect(&path).unwrap());
         watcher.get_mut().write_all(b"{\"ask\":\"watch\",\"ports\":[\"*\"]}\n").unwrap();
@@ -127,7 +127,7 @@ impl Watched {
                 answer.clear();
             }
         });
-        Self { feed, _socket: socket, watcher: watcher }
+        Self { feed, _socket: socket, watcher }
     }
 }
 

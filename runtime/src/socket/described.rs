@@ -114,17 +114,19 @@ impl Described {
 
     /// Describes the run and its state.
     pub(super) fn about(&self, frame: &Frame, whole: &Whole) -> About {
-        let task = |((name, modes), (mode, halted, ended)): (&(String, Vec<String>), &(Option<usize>, bool, bool))| {
-            let mode = mode.and_then(|mode| modes.get(mode).cloned());
-            TaskState { name: name.clone(), mode, halted: *halted, ended: *ended }
-        };
+        let tasks = self.tasks.iter().zip(&whole.tasks).map(|((name, modes), task)| TaskState {
+            name: name.clone(),
+            mode: task.mode.and_then(|mode| modes.get(mode).cloned()),
+            halted: task.is_halted,
+            ended: task.has_ended,
+        });
         About {
             pid: std::process::id(),
             graph: self.facts.graph.clone(),
             since: self.since,
             t: seconds(frame.now),
             tick: frame.tick,
-            tasks: self.tasks.iter().zip(&whole.tasks).map(task).collect(),
+            tasks: tasks.collect(),
         }
     }
 

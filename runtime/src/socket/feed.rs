@@ -104,11 +104,19 @@ pub(super) enum Content {
     Whole(Whole),
 }
 
+/// The state of a task.
+#[derive(Debug)]
+pub(super) struct FedTask {
+    /// Number of its mode; none in a task without modes.
+    pub(super) mode: Option<usize>,
+    pub(super) is_halted: bool,
+    pub(super) has_ended: bool,
+}
+
 /// Everything that a run shows.
 #[derive(Debug)]
 pub(super) struct Whole {
-    /// For each task the number of its mode, whether it is halted, and whether it has ended.
-    pub(super) tasks: Vec<(Option<usize>, bool, bool)>,
+    pub(super) tasks: Vec<FedTask>,
     /// The value and the target of each live parameter.
     pub(super) live: Vec<[f64; 2]>,
     /// The numbers of each port, if it is present.
@@ -239,8 +247,11 @@ impl FeedReader {
             Content::Watched(ports)
         } else {
             let mut pair = || Some([words.next()?, words.next()?]);
-            let task =
-                |[mode, flags]: [u64; 2]| ((mode != NO_MODE).then_some(mode as usize), flags & 1 != 0, flags & 2 != 0);
+            let task = |[mode, flags]: [u64; 2]| FedTask {
+                mode: (mode != NO_MODE).then_some(mode as usize),
+                is_halted: flags & 1 != 0,
+                has_ended: flags & 2 != 0,
+            };
             let tasks = (0..self.tasks).map(|_| pair().map(task)).collect::<Option<_>>()?;
             let live = (0..self.live).map(|_| pair().map(|both| both.map(f64::from_bits))).collect::<Option<_>>()?;
             let ports = self.widths.iter().map(|width| take_port(&mut words, *width)).collect::<Option<_>>()?;

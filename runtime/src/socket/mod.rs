@@ -16,7 +16,7 @@ mod server;
 
 pub use described::RunFacts;
 pub use feed::Feed;
-pub use server::{RunSocket, open};
+pub use server::{OpenedSocket, RunSocket, open};
 
 pub(crate) use asks::{About, Ask, Got, LiveState, Origin, PortState, TaskState, WalkAnswer};
 pub(crate) use client::{Client, Sample};

@@ -50,6 +50,18 @@ pub struct RunSocket {
     path: PathBuf,
 }
 
+/// An open socket, and its ends in the run.
+pub struct OpenedSocket {
+    /// Closes the socket when it is dropped.
+    pub socket: RunSocket,
+    /// Gets every tick.
+    pub feed: Feed,
+    /// The stops that clients request.
+    pub stops: Arc<StopRequests>,
+    /// The changes that clients request.
+    pub requests: Receiver<ChangeRequest>,
+}
+
 /// What the thread works with.
 struct Shared {
     listener: BlockingListener,
@@ -59,15 +71,11 @@ struct Shared {
     changes: std::sync::mpsc::SyncSender<ChangeRequest>,
 }
 
-/// Opens the socket of a run: the end of the ring for its ticks, the stops that clients request, and their changes.
+/// Opens the socket of a run, which a thread of its own serves.
 ///
 /// # Errors
 /// If the socket or its thread cannot be made.
-#[expect(clippy::type_complexity, reason = "each part goes to another place")]
-pub fn open(
-    engine: &Engine,
-    facts: RunFacts,
-) -> Result<(RunSocket, Feed, Arc<StopRequests>, Receiver<ChangeRequest>), String> {
+pub fn open(engine: &Engine, facts: RunFacts) -> Result<OpenedSocket, String> {
     let (listener, path) = bind()?;
     let (feed, reader, wishes) = feed(engine);
     let (changes, requests) = sync_channel(MAX_CHANGES);
@@ -84,7 +92,7 @@ pub fn open(
     // From here on, the file is removed at the end.
     let mut socket = RunSocket { thread: None, end: Some(end), path };
     socket.thread = Some(thread.map_err(|error| format!("cannot start a thread: {error}"))?);
-    Ok((socket, feed, stops, requests))
+    Ok(OpenedSocket { socket, feed, stops, requests })
 }
 
 impl RunSocket {
@@ -175,29 +183,20 @@ async fn talk(read: OwnedReadHalf, write: &mut OwnedWriteHalf, hub: &Hub) -> io:
                 answer::<()>(write, Err(format!("this line is no request: {error}; docs/live.md lists them"))).await?;
                 sleep(REST).await;
             }
+            Ok(Ask::About {}) => {
+                let about = hub.whole().await.map(|both| hub.described.about(&both.0, &both.1));
+                answer(write, about).await?;
+            }
+            Ok(Ask::Get { pattern }) => {
+                let whole = hub.whole().await;
+                let got = whole.and_then(|both| hub.described.got(&both.0, &both.1, pattern.as_deref()));
+                answer(write, got).await?;
+            }
+            Ok(Ask::Set { values }) => answer(write, hub.set(values.into_iter().collect()).await).await?,
+            Ok(Ask::Send { word }) => answer(write, hub.send(&word)).await?,
             Ok(Ask::Watch { ports, count }) => return watch(&ports, count, &mut reader, write, hub).await,
-            Ok(ask) => carry_out(ask, write, hub).await?,
         }
         sleep(PAUSE).await;
-    }
-}
-
-async fn carry_out(ask: Ask, write: &mut OwnedWriteHalf, hub: &Hub) -> io::Result<()> {
-    match ask {
-        Ask::About {} => {
-            let about = hub.whole().await.map(|both| hub.described.about(&both.0, &both.1));
-            answer(write, about).await
-        }
-        Ask::Get { pattern } => {
-            let got = match hub.whole().await {
-                Ok(both) => hub.described.got(&both.0, &both.1, pattern.as_deref()),
-                Err(why) => Err(why),
-            };
-            answer(write, got).await
-        }
-        Ask::Set { values } => answer(write, hub.set(values.into_iter().collect()).await).await,
-        Ask::Send { word } => answer(write, hub.send(&word)).await,
-        Ask::Watch { .. } => Ok(()),
     }
 }
 

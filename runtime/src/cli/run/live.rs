@@ -5,7 +5,7 @@ use crate::cli::shell::Shell;
 use crate::engine::{Changer, Engine, RunOptions, ScheduledChanges};
 use crate::graph::{Compiled, Request, compile};
 #[cfg(unix)]
-use crate::socket::{Feed, RunFacts, RunSocket, open};
+use crate::socket::{Feed, OpenedSocket, RunFacts, RunSocket, open};
 
 /// What may change a run from outside.
 pub(crate) struct Live<'s> {
@@ -74,7 +74,7 @@ impl<'s> Live<'s> {
     ) -> Self {
         let Some(facts) = facts else { return Self { changes, socket: None } };
         match open(engine, facts) {
-            Ok((socket, feed, stops, requests)) => {
+            Ok(OpenedSocket { socket, feed, stops, requests }) => {
                 options.stops = Some(stops);
                 let changes = changes.map(|changes| changes.with_requests(requests));
                 Self { changes, socket: Some(OpenSocket { _socket: socket, feed }) }

@@ -39,7 +39,7 @@ pub(super) fn ps(args: PsArgs, shell: &Shell) -> Result<u8, u8> {
 }
 
 fn text(runs: &[&About]) -> String {
-    let mut rows = vec![["pid", "graph", "mode", "since", "commands"].map(String::from)];
+    let mut rows = vec![["PID", "graph", "mode", "since", "commands"].map(String::from)];
     for about in runs {
         let mut tasks = about.tasks.iter();
         let (pid, graph) = (about.pid.to_string(), about.graph.clone());

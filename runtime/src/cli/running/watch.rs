@@ -32,11 +32,8 @@ pub(super) fn watch(args: WatchArgs, shell: &Shell) -> Result<u8, u8> {
     client.ask::<()>(&Ask::Watch { ports: args.ports, count: args.count }).map_err(refuse)?;
     client.wait_for_ever().map_err(refuse)?;
     let mut lines = 0;
-    loop {
-        match client.line().map_err(refuse)? {
-            Sample::Line(line) => shell.say(line.trim_end()),
-            Sample::End => break,
-        }
+    while let Sample::Line(line) = client.line().map_err(refuse)? {
+        shell.say(line.trim_end());
         lines += 1;
         if shell.is_out_closed() {
             return Ok(0);
