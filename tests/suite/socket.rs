@@ -211,6 +211,7 @@ fn garbage_is_refused_and_delays_nobody() {
         (r#"{"ask":"set","values":{}}"#, "name a parameter and its value"),
         (r#"{"ask":"set","values":{"pid.gains.y.kp":"2"}}"#, "this line is no request"),
         (r#"{"ask":"set","values":{"pid.gains.y.kp":1e999}}"#, "this line is no request"),
+        (r#"{"ask":"get","pattern":"********"}"#, "a pattern has at most 4 `*`"),
         (r#"{"ask":"send","word":"resume"}"#, "can start a motion"),
     ];
     let mut client = session.connect(pid);

@@ -5,8 +5,8 @@ mod events;
 mod files;
 mod held;
 mod lateness;
-mod live;
 pub(super) mod log;
+mod outside;
 mod ports;
 mod progress;
 mod slow;
@@ -20,8 +20,8 @@ use std::path::PathBuf;
 use std::sync::Arc;
 
 use files::OutputFiles;
-use live::{Live, changes};
 use log::NodeLog;
+use outside::{Live, changes};
 use progress::Progress;
 use summary::Summary;
 
