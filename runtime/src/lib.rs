@@ -12,6 +12,7 @@
 //! - [`random`]: seeded random numbers
 //! - [`record`]: recordings of runs as tables; `recording`: whole runs, behind the feature `mcap`; [`scenario`]: checks on the results of runs
 //! - [`harness`]: test rigs for nodes and graphs
+//! - `socket`: the socket of a run in real time, behind the feature `cli`
 //! - `cli`: the command line as a library, behind the feature `cli`
 
 // The derives name this crate from outside; they work inside it too.
@@ -34,4 +35,6 @@ pub mod record;
 pub mod recording;
 pub mod scenario;
 pub mod signal;
+#[cfg(all(feature = "cli", unix))]
+pub mod socket;
 pub mod source;

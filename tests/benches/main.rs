@@ -6,6 +6,8 @@ mod finger_press;
 mod fused;
 mod hand;
 mod recorded;
+#[cfg(unix)]
+mod watched;
 
 use std::hint::black_box;
 use std::time::Instant;
@@ -125,6 +127,23 @@ fn recorded() {
     );
 }
 
+/// Greatest ratio of a tick that is watched to one that is recorded alone.
+#[cfg(unix)]
+const MOST_WATCHED: f64 = 1.2;
+
+/// Compares the time of a tick with watchers to that without.
+#[cfg(unix)]
+fn watched() {
+    let [recorded, open, watched] = watched::watched();
+    for (what, time) in [("an open socket", open), ("five watchers and garbage", watched)] {
+        let ratio = time / recorded;
+        let verdict = if ratio <= MOST_WATCHED { "good" } else { "TOO MUCH" };
+        println!(
+            "hybrid, a recorded tick with {what}: {time:.0} ns, ratio {ratio:.3} to {recorded:.0} ns, at most {MOST_WATCHED}: {verdict}"
+        );
+    }
+}
+
 /// Runs one of the two alone, for a tool that counts instructions: `tick -- graph 1000`.
 fn count(what: &str, ticks: u32) {
     const FRAME: usize = 150;
@@ -184,6 +203,8 @@ fn main() {
         }
         [what] if what == "same" => same_bits(),
         [what] if what == "recorded" => recorded(),
+        #[cfg(unix)]
+        [what] if what == "watched" => watched(),
         [what, ticks] => count(what, ticks.parse().expect("a number of ticks")),
         _ => {
             chains();

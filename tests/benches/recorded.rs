@@ -47,7 +47,7 @@ pub(crate) fn recording() -> f64 {
 }
 
 /// Returns an engine of the task in contact.
-fn in_contact(request: &Request, is_recorded: bool) -> (Engine, Option<RunRecorder>) {
+pub(crate) fn in_contact(request: &Request, is_recorded: bool) -> (Engine, Option<RunRecorder>) {
     let plan = compile(&tactflow_nodes::catalogue(), request).expect("the graph has no mistake");
     let mut engine = Engine::new(plan);
     let record = RecordRequest { request, is_real: true, seed: None, path: None };

@@ -86,6 +86,8 @@ mod signals;
 mod sim;
 mod situations;
 mod slow;
+#[cfg(unix)]
+mod socket;
 #[cfg(target_os = "linux")]
 mod stream;
 mod svg;

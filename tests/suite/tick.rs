@@ -1,5 +1,9 @@
 //! What a tick does not do, recorded or not: allocate, or call the operating system.
 
+#[cfg(unix)]
+use std::io::{BufRead, BufReader, Write};
+#[cfg(unix)]
+use std::os::unix::net::UnixStream;
 use std::path::Path;
 
 use tactflow_runtime::catalogue::Catalogue;
@@ -7,6 +11,8 @@ use tactflow_runtime::engine::{Changer, Engine};
 use tactflow_runtime::graph::{Request, compile};
 use tactflow_runtime::record::OutputFile;
 use tactflow_runtime::recording::{RecordRequest, RunRecorder};
+#[cfg(unix)]
+use tactflow_runtime::socket::{Feed, OpenedSocket, RunFacts, RunSocket};
 use tactflow_tests::examples::graph_of_all;
 use tactflow_tests::{catalogue, shipped_graphs, workspace};
 
@@ -92,6 +98,58 @@ fn a_parameter_changes_without_allocating_or_freeing_in_the_tick() {
     assert!(recorder.finish(|_| true).error.is_none());
 }
 
+/// The socket of an engine, of which one client watches everything and another one asks again and again.
+#[cfg(unix)]
+struct Watched {
+    feed: Feed,
+    _socket: RunSocket,
+    watcher: BufReader<UnixStream>,
+}
+
+#[cfg(unix)]
+impl Watched {
+    fn new(engine: &Engine) -> Self {
+        let plan =
+            compile(&catalogue(), &Request::file(workspace().join("graphs/hybrid.toml"))).unwrap_or_else(|_| panic!());
+        let facts = RunFacts::of(&plan, Path::new("graphs/hybrid.toml"), true);
+        let OpenedSocket { socket, feed, .. } = tactflow_runtime::socket::open(engine, facts).unwrap();
+        let path = socket.path().to_owned();
+        let mut watcher = BufReader::new(UnixStream::connect(&path).unwrap());
+        watcher.get_mut().write_all(b"{\"ask\":\"watch\",\"ports\":[\"*\"]}\n").unwrap();
+        let mut answer = String::new();
+        watcher.read_line(&mut answer).unwrap();
+        // A graph of images alone has no number.
+        assert!(answer == "{\"ok\":null}\n" || answer.contains("no number of a port"), "{answer}");
+        let mut asker = BufReader::new(UnixStream::connect(&path).unwrap());
+        std::thread::spawn(move || {
+            let mut answer = String::new();
+            while asker.get_mut().write_all(b"{\"ask\":\"get\"}\n").is_ok() && asker.read_line(&mut answer).is_ok() {
+                answer.clear();
+            }
+        });
+        Self { feed, _socket: socket, watcher }
+    }
+}
+
+/// One process has one socket, so one test of this process opens it.
+#[cfg(unix)]
+#[test]
+fn a_watched_tick_neither_allocates_nor_frees() {
+    let request = Request::file(workspace().join("graphs/hybrid.toml"));
+    let mut engine = engine(&request);
+    let mut watched = Watched::new(&engine);
+    while let Some(now) = engine.next().filter(|_| engine.ticks() < 400) {
+        engine.tick(now).unwrap();
+        let counted = allocation_counter::measure(|| watched.feed.publish(&engine));
+        assert_eq!(counted.count_total, 0, "in tick {}", engine.ticks());
+        // The thread of the socket asks for all values meanwhile.
+        std::thread::sleep(std::time::Duration::from_millis(1));
+    }
+    let mut line = String::new();
+    watched.watcher.read_line(&mut line).unwrap();
+    assert!(line.starts_with("{\"t\":0.0,") && line.contains("\"move.joints.stuck\":"), "{line}");
+}
+
 #[test]
 fn the_counter_counts() {
     let counted = allocation_counter::measure(|| drop(std::hint::black_box(vec![1_u8; 100])));
@@ -141,6 +199,8 @@ fn in_a_jail() {
         .map(|((engine, _), (_, request))| change(engine, &catalogue, &request))
         .collect();
     assert!(changers.iter().any(Option::is_some), "no shipped graph lists a parameter in [live]");
+    // Somebody watches every port of every graph, and wants all values now and then.
+    let mut sockets: Vec<Watched> = engines.iter().map(|(engine, _)| Watched::new(engine)).collect();
     // Whatever a first panic or a first float would set up lazily is set up by the first tick.
     for (engine, recorder) in &mut engines {
         let now = engine.next().unwrap();
@@ -152,11 +212,12 @@ fn in_a_jail() {
         // Any call that is not allowed.
         let _ = std::fs::metadata("/");
     }
-    for (engine, recorder) in &mut engines {
+    for ((engine, recorder), watched) in engines.iter_mut().zip(&mut sockets) {
         let mut ticks = 0;
         while let Some(now) = engine.next().filter(|_| ticks < 1000) {
             engine.tick(now).unwrap();
             recorder.record(engine, || false);
+            watched.feed.publish(engine);
             ticks += 1;
         }
     }

@@ -180,7 +180,11 @@ fn while_it_runs_a_terminal_sees_the_mode_the_limits_and_what_holds_the_commands
         assert!(seen.contains(text), "{text}: {seen}");
     }
     assert!(!seen.contains("commands held"), "{seen}");
-    let halted = said_to_a_terminal(100, &["run", HYBRID, "--realtime", "--send", "0.9s:stop", "--send", "1.7s:resume", "--for", "2s"]).out;
+    let halted = said_to_a_terminal(
+        100,
+        &["run", HYBRID, "--realtime", "--send", "0.9s:stop", "--send", "1.7s:resume", "--for", "2s"],
+    )
+    .out;
     assert!(halted.contains("commands stopped until `resume`: "), "{halted}");
 }
 

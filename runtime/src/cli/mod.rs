@@ -23,6 +23,8 @@ mod reference;
 #[cfg(feature = "mcap")]
 mod report;
 mod run;
+#[cfg(unix)]
+mod running;
 mod shell;
 mod show;
 mod still;
@@ -93,6 +95,8 @@ impl Tool {
                 derived(completions::completions),
             ],
         };
+        #[cfg(unix)]
+        let tool = running::commands().into_iter().fold(tool, Self::command);
         #[cfg(feature = "mcap")]
         let tool = recorded::commands().into_iter().fold(tool, Self::command).command(derived(report::report));
         tool

@@ -9,7 +9,7 @@ mod session;
 pub(crate) use self::core::NodeRunner;
 pub use self::core::{Counters, ModeChange, Timing};
 pub use session::{
-    Beginning, Changer, DisplayedPort, End, Engine, Halt, Interrupt, LateTick, LiveValue, Logged, Outcome, Punctuality,
-    Rest, RunOptions, ScheduledChanges, TaskEnd, TaskRun, TickUse, ValueChange, block_io_signals, run, run_changing,
-    run_virtual,
+    Beginning, ChangeRequest, Changer, DisplayedPort, End, Engine, Halt, Interrupt, LateTick, LiveValue, Logged,
+    Outcome, Punctuality, Rest, RunOptions, ScheduledChanges, StopRequests, TaskEnd, TaskRun, TickUse, ValueChange,
+    Walk, block_io_signals, run, run_changing, run_virtual,
 };

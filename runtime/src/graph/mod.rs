@@ -26,6 +26,8 @@ pub(crate) use compile::compile_in;
 pub use compiled::Compiled;
 pub(crate) use load::{Loader, wrong_file_type};
 pub use load::{RecordedGraph, Request};
+#[cfg(all(feature = "cli", unix))]
+pub(crate) use plan::matches;
 pub use plan::{AllowedWarning, LiveParam, PlannedPort, RecordedPorts};
 pub(crate) use plan::{
     Clock, Condition, LivePlan, Plan, PlannedCommand, PlannedDevice, PlannedExit, PlannedModes, PlannedNode,

@@ -21,5 +21,5 @@ pub use recorder::{Recorded, Recorder};
 #[cfg(feature = "cli")]
 pub use rows::{RunColumn, RunRows, TaskModes};
 pub use writer::{RecordFormat, RowFormat};
-#[cfg(feature = "mcap")]
+#[cfg(any(feature = "mcap", all(feature = "cli", unix)))]
 pub(crate) use writer::{seconds as file_seconds, time_text as seconds_text};

@@ -6,6 +6,7 @@ mod files;
 mod held;
 mod lateness;
 pub(super) mod log;
+mod outside;
 mod ports;
 mod progress;
 mod slow;
@@ -21,6 +22,7 @@ use std::sync::Arc;
 
 use files::OutputFiles;
 use log::NodeLog;
+use outside::{Live, changes};
 use progress::Progress;
 use summary::Summary;
 
@@ -30,9 +32,9 @@ use super::shell::patience::Patience;
 use super::shell::{FAULTED, INTERRUPTED, Shell, unknown};
 use super::text::number::{milliseconds, seconds};
 use super::text::prose::PageStyle;
-use crate::engine::{self, Changer, End, Engine, Interrupt, Outcome, RunOptions, ScheduledChanges};
+use crate::engine::{self, End, Engine, Interrupt, Outcome, RunOptions};
 use crate::fault::Fault;
-use crate::graph::{Compiled, Request, compile};
+use crate::graph::{Compiled, Request};
 use crate::record::PointsRequest;
 use crate::source::{Code, quoted};
 
@@ -104,6 +106,10 @@ pub struct JobOptions {
     /// Read words from standard input during the run, one per line; requires real time
     #[arg(long)]
     pub listen: bool,
+    /// Open no socket, so that `ps`, `get`, `set`, `send` and `watch` do not reach the run; in virtual time there is none
+    #[cfg(unix)]
+    #[arg(long)]
+    pub no_socket: bool,
     /// Record all ports in a .csv or .ndjson file: one row per tick, one column per number; `-` is standard output
     #[arg(short, long, value_name = "FILE")]
     pub out: Option<PathBuf>,
@@ -179,9 +185,10 @@ impl Job {
         let mut warnings = plan.warnings().into_iter().flat_map(|report| report.diagnostics);
         let start = warnings.find(|warning| warning.code == Code::StartOutside).map(|warning| warning.message);
         let silences = plan.silences().to_vec();
+        let facts = self.socket_facts(&plan, is_real);
         let mut engine = Engine::new(plan);
         self.check_words(&engine)?;
-        let mut changes = self.changes(&mut engine, request, shell)?;
+        let changes = changes(self, &mut engine, request, facts.is_some(), shell)?;
         let run = (request, is_real);
         let mut files = match OutputFiles::create(self, chosen.as_ref(), &mut engine, run, &interrupt, shell) {
             Err(message) if interrupt.is_requested() => {
@@ -206,8 +213,9 @@ impl Job {
         let terminal = Some(shell.err()).filter(|_| self.print != Print::Nothing);
         let mut progress = Progress::new(end, terminal, shell.has_colour_on_stderr());
         let (sends, listens) = (send.clone(), *listen);
-        let options =
+        let mut options =
             RunOptions { duration: *duration, is_realtime: *realtime, sends, listens, ..RunOptions::default() };
+        let Live { mut changes, mut socket } = Live::open(changes, facts, &engine, &mut options, shell);
         let outcome = without_panic_messages(|| {
             let mut observe = |engine: &Engine| {
                 summary.add(engine);
@@ -215,6 +223,7 @@ impl Job {
                     log.write(engine);
                 }
                 files.add(engine, &patience);
+                socket.iter_mut().for_each(|socket| socket.publish(engine));
                 progress.show(seconds(engine.now()), engine.ticks(), |style| summary.live(engine, style));
             };
             match &mut changes {
@@ -222,6 +231,7 @@ impl Job {
                 None => engine::run(&mut engine, &options, &mut observe),
             }
         });
+        drop(socket);
         shell.set_patience(&patience.after_run());
         files.end(&engine, &outcome);
         progress.clear();
@@ -260,21 +270,6 @@ impl Job {
         }
         shell.error(format_args!("{fault}; every command went to zero{}", endless_stop(engine, fault)));
         FAULTED
-    }
-
-    /// Schedules the changes of parameters, if there are any.
-    fn changes<'s>(
-        &self,
-        engine: &mut Engine,
-        request: &Request,
-        shell: &'s Shell,
-    ) -> Result<Option<ScheduledChanges<'s>>, String> {
-        if self.options.change.is_empty() {
-            return Ok(None);
-        }
-        let catalogue = shell.catalogue();
-        let changer = Changer::new(engine, request, move |request| compile(catalogue, request).map(drop))?;
-        ScheduledChanges::new(changer, &self.options.change).map(Some)
     }
 
     /// Prints a line unless the run is quiet.

@@ -151,6 +151,11 @@ impl Shell {
         self.is_out_text.store(true, Ordering::Relaxed);
     }
 
+    /// Whether nobody reads standard output any more.
+    pub(crate) fn is_out_closed(&self) -> bool {
+        self.out.is_closed()
+    }
+
     fn is_out_taken(&self) -> bool {
         self.is_out_taken.load(Ordering::Relaxed)
     }

@@ -23,6 +23,17 @@ const SPACING: f64 = 0.8;
 /// A check of a whole graph, which is called while it runs.
 type GraphCheck<'c> = dyn Fn(&Request) -> Result<(), Report> + Send + 'c;
 
+/// The way of a parameter from its value to another one.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Walk {
+    /// The value at its start.
+    pub from: f64,
+    /// The value at its end.
+    pub to: f64,
+    /// Its time, with a clock whose ticks are not shorter than its period [s].
+    pub seconds: f64,
+}
+
 /// Changes the parameters that a graph lists in `[live]` while it runs.
 pub struct Changer<'c> {
     /// Checks a whole graph.
@@ -33,6 +44,8 @@ pub struct Changer<'c> {
     fronts: Vec<[f64; 2]>,
     steps: Producer<Step>,
     back: Consumer<Step>,
+    /// Nominal time between two ticks [s].
+    period: f64,
     /// Shortest tick that takes a step [s].
     spacing: f64,
     /// Number of steps that wait for the tick at most.
@@ -55,8 +68,9 @@ impl<'c> Changer<'c> {
         let request = Request { recorded: Some(Arc::new(recorded)), ..request.clone() };
         let (steps, of_engine) = RingBuffer::new(MAX_STEPS);
         let (to_free, back) = RingBuffer::new(MAX_STEPS);
-        let spacing = SPACING * engine.period() as f64 * 1e-9;
-        let lead = (LEAD_S / (engine.period() as f64 * 1e-9)) as usize;
+        let period = engine.period() as f64 * 1e-9;
+        let spacing = SPACING * period;
+        let lead = (LEAD_S / period) as usize;
         let lead = lead.clamp(MIN_STEPS, MAX_STEPS);
         let fronts = engine.live_values().map(|live| [live.value; 2]).collect();
         engine.live.connect(of_engine, to_free, spacing);
@@ -67,6 +81,7 @@ impl<'c> Changer<'c> {
             fronts,
             steps,
             back,
+            period,
             spacing,
             lead,
         })
@@ -101,15 +116,39 @@ impl<'c> Changer<'c> {
     /// # Errors
     /// Returns why the change is refused; nothing changes then.
     pub fn set(&mut self, name: &str, value: f64) -> Result<(), String> {
-        let at = self.find(name, value)?;
-        let targets = self.fronts.iter().enumerate().map(|(i, [_, target])| if i == at { value } else { *target });
-        let live = self.plan.params.iter().map(|param| param.name.clone()).zip(targets).collect();
-        let request = Request { live, ..self.request.clone() };
+        self.set_all(&[(name.to_owned(), value)]).map(drop)
+    }
+
+    /// Begins several changes at once, which are checked together. Returns the way of each.
+    ///
+    /// # Errors
+    /// Returns why one of them is refused; nothing changes then.
+    pub fn set_all(&mut self, values: &[(String, f64)]) -> Result<Vec<Walk>, String> {
+        let mut targets: Vec<f64> = self.fronts.iter().map(|[_, target]| *target).collect();
+        let found: Result<Vec<usize>, String> = values.iter().map(|(name, value)| self.find(name, *value)).collect();
+        let found = found?;
+        found.iter().zip(values).for_each(|(at, (_, value))| targets[*at] = *value);
+        let names = self.plan.params.iter().map(|param| param.name.clone());
+        let request = Request { live: names.zip(targets.iter().copied()).collect(), ..self.request.clone() };
         if let Err(report) = (self.check)(&request) {
-            return Err(format!("`{name}` cannot be {value}: {}", report.render(false)));
+            let all: Vec<String> = values.iter().map(|(name, value)| format!("`{name}` cannot be {value}")).collect();
+            return Err(format!("{}: {}", all.join(", "), report.render(false)));
         }
-        self.fronts[at][1] = value;
-        Ok(())
+        self.fronts.iter_mut().zip(targets).for_each(|(front, target)| front[1] = target);
+        Ok(found.into_iter().map(|at| self.walk(at)).collect())
+    }
+
+    /// Returns the way of a parameter to its target.
+    fn walk(&self, at: usize) -> Walk {
+        let [from, to] = self.fronts[at];
+        let waiting = (MAX_STEPS - self.steps.slots()) as f64;
+        let steps = ((to - from).abs() / (self.plan.params[at].rate * self.spacing)).ceil();
+        Walk { from, to, seconds: if from == to { 0.0 } else { (waiting + steps) * self.period } }
+    }
+
+    /// Whether a parameter is on its way to its target.
+    pub(super) fn is_moving(&self) -> bool {
+        self.fronts.iter().any(|[value, target]| value.to_bits() != target.to_bits())
     }
 
     /// Frees old configurations, and builds steps until enough of them wait or every parameter has its value.

@@ -2,9 +2,12 @@
 
 use std::collections::VecDeque;
 use std::io::{IsTerminal, stdin};
+use std::sync::Arc;
 
 use super::engine::Engine;
 use super::line_reader::{LineReader, stops};
+use super::outcome::RunOptions;
+use super::stop_requests::StopRequests;
 use super::task_run::TaskRun;
 
 /// Maximum number of words from the standard input that one tick carries out.
@@ -18,21 +21,24 @@ pub(crate) struct OperatorInput {
     tasks: Vec<String>,
     /// The standard input; `None` if it is not read or has ended.
     reader: Option<LineReader>,
+    /// Stops that other threads request.
+    stops: Option<Arc<StopRequests>>,
     warnings: Warnings,
 }
 
 impl OperatorInput {
-    /// Takes words scheduled in the graph's time [s] and, if `reads_stdin`, the lines of the standard input.
+    /// Takes the scheduled words, the requested stops and, if the run listens, the lines of the standard input.
     ///
     /// # Errors
     /// If there can be no thread that reads.
-    pub(crate) fn new(scheduled: &[(f64, String)], reads_stdin: bool, engine: &Engine) -> std::io::Result<Self> {
+    pub(crate) fn new(options: &RunOptions, engine: &Engine) -> std::io::Result<Self> {
         let mut scheduled: Vec<(i64, String)> =
-            scheduled.iter().map(|(seconds, word)| ((seconds * 1e9) as i64, word.clone())).collect();
+            options.sends.iter().map(|(seconds, word)| ((seconds * 1e9) as i64, word.clone())).collect();
         scheduled.sort_by_key(|(at, _)| *at);
         let tasks: Vec<String> = engine.tasks().iter().skip(1).map(TaskRun::name).map(str::to_owned).collect();
-        let reader = reads_stdin.then(|| LineReader::start(stdin(), tasks.clone(), is_back_later)).transpose()?;
-        Ok(Self { scheduled: scheduled.into(), tasks, reader, warnings: Warnings::default() })
+        let reader = options.listens.then(|| LineReader::start(stdin(), tasks.clone(), is_back_later)).transpose()?;
+        let stops = options.stops.clone();
+        Ok(Self { scheduled: scheduled.into(), tasks, reader, stops, warnings: Warnings::default() })
     }
 
     /// Sends the words that are due at `now` [ns] to the engine, each stop before all others.
@@ -41,6 +47,9 @@ impl OperatorInput {
         let due = self.scheduled.drain(..due).map(|(_, word)| word);
         let (stop, others): (Vec<String>, Vec<String>) = due.partition(|word| stops(word, &self.tasks));
         stop.iter().for_each(|word| warn(engine.send(word)));
+        if let Some(stops) = &self.stops {
+            stops.carry_out(engine, warn);
+        }
         self.carry_out_lines(engine, now);
         others.iter().for_each(|word| warn(engine.send(word)));
     }

@@ -5,6 +5,7 @@ use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 use std::time::Duration;
 
+use super::stop_requests::StopRequests;
 use crate::fault::Fault;
 
 /// Options of a run.
@@ -21,6 +22,8 @@ pub struct RunOptions {
     pub listens: bool,
     /// Ends the run as Ctrl-C does, once somebody sets it.
     pub cancel: Option<Arc<AtomicBool>>,
+    /// Stops that other threads request.
+    pub stops: Option<Arc<StopRequests>>,
 }
 
 /// Why a run ended.

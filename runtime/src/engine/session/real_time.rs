@@ -103,7 +103,7 @@ impl RealTimePacer<'_, '_> {
         let is_live = engine.is_live();
         let is_real = options.is_realtime || is_live;
         let until = options.duration.map_or(i64::MAX, |seconds| (seconds * 1e9) as i64);
-        let input = OperatorInput::new(&options.sends, options.listens, engine)?;
+        let input = OperatorInput::new(options, engine)?;
         for device in &mut engine.devices {
             if let DeviceLink::Stepped(driver) = &mut device.link {
                 driver.watch(interrupt.flag());

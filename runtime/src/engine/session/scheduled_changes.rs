@@ -3,18 +3,30 @@
 
 use std::collections::VecDeque;
 use std::sync::atomic::{AtomicBool, AtomicI64, Ordering};
+use std::sync::mpsc::{Receiver, RecvTimeoutError};
 use std::time::Duration;
 
-use super::changer::Changer;
+use super::changer::{Changer, Walk};
 
 /// Interval at which the thread looks for work. The steps in the ring last longer.
 const LOOK: Duration = Duration::from_millis(2);
+/// The same while nothing changes and nothing is scheduled.
+const IDLE_LOOK: Duration = Duration::from_millis(20);
+
+/// A change that another thread requests while the graph runs in real time.
+pub struct ChangeRequest {
+    /// Parameters and their values, which change together.
+    pub values: Vec<(String, f64)>,
+    /// Takes the ways of the parameters, or why the change is refused.
+    pub answer: Box<dyn FnOnce(Result<Vec<Walk>, String>) + Send>,
+}
 
 /// Changes that begin at times of the graph's clock.
 pub struct ScheduledChanges<'c> {
     changer: Changer<'c>,
     /// Time [ns], parameter and value, in order of time.
     due: VecDeque<(i64, String, f64)>,
+    requests: Option<Receiver<ChangeRequest>>,
 }
 
 impl<'c> ScheduledChanges<'c> {
@@ -29,7 +41,13 @@ impl<'c> ScheduledChanges<'c> {
         let mut due: Vec<(i64, String, f64)> =
             changes.iter().map(|(at, name, value)| ((at * 1e9) as i64, name.clone(), *value)).collect();
         due.sort_by_key(|(at, ..)| *at);
-        Ok(Self { changer, due: due.into() })
+        Ok(Self { changer, due: due.into(), requests: None })
+    }
+
+    /// Takes requests of other threads too. They are carried out in real time only.
+    #[must_use]
+    pub fn with_requests(self, requests: Receiver<ChangeRequest>) -> Self {
+        Self { requests: Some(requests), ..self }
     }
 
     /// Begins the changes that are due at `now` [ns], and prepares steps for the next ticks.
@@ -48,7 +66,18 @@ impl<'c> ScheduledChanges<'c> {
     pub(super) fn work(&mut self, now: &AtomicI64, is_over: &AtomicBool) {
         while !is_over.load(Ordering::Relaxed) {
             self.prepare(now.load(Ordering::Relaxed));
-            std::thread::sleep(LOOK);
+            let is_idle = self.due.is_empty() && !self.changer.is_moving();
+            self.wait(if is_idle { IDLE_LOOK } else { LOOK });
+        }
+    }
+
+    /// Waits for a request, and carries it out. Between two requests, steps are prepared.
+    fn wait(&mut self, time: Duration) {
+        let Some(requests) = &self.requests else { return std::thread::sleep(LOOK) };
+        match requests.recv_timeout(time) {
+            Ok(ChangeRequest { values, answer }) => answer(self.changer.set_all(&values)),
+            Err(RecvTimeoutError::Timeout) => {}
+            Err(RecvTimeoutError::Disconnected) => self.requests = None,
         }
     }
 }

@@ -1,0 +1,233 @@
+//! The thread of the socket: it accepts clients of the same user, and answers their requests.
+
+use std::io;
+use std::os::unix::net::UnixListener as BlockingListener;
+use std::path::{Path, PathBuf};
+use std::rc::Rc;
+use std::sync::Arc;
+use std::sync::mpsc::{Receiver, sync_channel};
+use std::thread::JoinHandle;
+use std::time::Duration;
+
+use nix::unistd::Uid;
+use serde::Serialize;
+use tokio::io::{AsyncReadExt, AsyncWriteExt, BufReader};
+use tokio::net::UnixListener;
+use tokio::net::unix::{OwnedReadHalf, OwnedWriteHalf};
+use tokio::sync::{Semaphore, oneshot};
+use tokio::task::LocalSet;
+use tokio::time::{sleep, timeout};
+
+use super::asks::{Answer, Ask};
+use super::described::{Described, RunFacts};
+use super::feed::{Feed, FeedReader, Wishes, feed};
+use super::folder::bind;
+use super::hub::Hub;
+use super::lines::{Line, MAX_LINE, read_line};
+use crate::engine::{ChangeRequest, Engine, StopRequests};
+
+/// Maximum number of clients.
+const MAX_CLIENTS: usize = 64;
+/// Maximum number of changes that wait for their check.
+const MAX_CHANGES: usize = 16;
+/// A client that asks nothing for this time is disconnected.
+const MAX_IDLE: Duration = Duration::from_secs(60);
+/// A client that does not read its answer for this time is disconnected.
+const MAX_WRITE: Duration = Duration::from_secs(10);
+/// Pause after a line that is no request, so that garbage costs no processor.
+const REST: Duration = Duration::from_millis(10);
+/// Pause after each request, so that a flood of them leaves the processor to the ticks.
+const PAUSE: Duration = Duration::from_millis(1);
+/// Pause after a client could not be accepted.
+const RETRY: Duration = Duration::from_millis(100);
+/// Time in which watchers can read the last samples of a run.
+const LAST: Duration = Duration::from_millis(200);
+
+/// The socket of a run. It is closed when it is dropped.
+pub struct RunSocket {
+    thread: Option<JoinHandle<()>>,
+    end: Option<oneshot::Sender<()>>,
+    path: PathBuf,
+}
+
+/// An open socket, and its ends in the run.
+pub struct OpenedSocket {
+    /// Closes the socket when it is dropped.
+    pub socket: RunSocket,
+    /// Gets every tick.
+    pub feed: Feed,
+    /// The stops that clients request.
+    pub stops: Arc<StopRequests>,
+    /// The changes that clients request.
+    pub requests: Receiver<ChangeRequest>,
+}
+
+/// What the thread works with.
+struct Shared {
+    listener: BlockingListener,
+    facts: Described,
+    ring: (Arc<Wishes>, FeedReader),
+    stops: Arc<StopRequests>,
+    changes: std::sync::mpsc::SyncSender<ChangeRequest>,
+}
+
+/// Opens the socket of a run, which a thread of its own serves.
+///
+/// # Errors
+/// If the socket or its thread cannot be made.
+pub fn open(engine: &Engine, facts: RunFacts) -> Result<OpenedSocket, String> {
+    let (listener, path) = bind()?;
+    let (feed, reader, wishes) = feed(engine);
+    let (changes, requests) = sync_channel(MAX_CHANGES);
+    let stops = StopRequests::of(engine);
+    let facts = Described::of(engine, facts);
+    let shared = Shared { listener, facts, ring: (wishes, reader), stops: Arc::clone(&stops), changes };
+    let (end, ended) = oneshot::channel();
+    let work = move || {
+        if let Err(error) = serve(shared, ended) {
+            tracing::warn!("the socket of the run is closed: {error}");
+        }
+    };
+    let thread = std::thread::Builder::new().name("socket".into()).spawn(work);
+    // From here on, the file is removed at the end.
+    let mut socket = RunSocket { thread: None, end: Some(end), path };
+    socket.thread = Some(thread.map_err(|error| format!("cannot start a thread: {error}"))?);
+    Ok(OpenedSocket { socket, feed, stops, requests })
+}
+
+impl RunSocket {
+    /// Returns the path of the socket.
+    #[must_use]
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+}
+
+impl Drop for RunSocket {
+    fn drop(&mut self) {
+        // It may be gone with the folder.
+        let _ = std::fs::remove_file(&self.path);
+        drop(self.end.take());
+        if let Some(thread) = self.thread.take() {
+            // A panic of the thread was printed when it happened.
+            let _ = thread.join();
+        }
+    }
+}
+
+/// Serves clients until the run is over.
+fn serve(shared: Shared, over: oneshot::Receiver<()>) -> io::Result<()> {
+    let runtime = tokio::runtime::Builder::new_current_thread().enable_io().enable_time().build()?;
+    LocalSet::new().block_on(&runtime, async move {
+        let listener = UnixListener::from_std(shared.listener)?;
+        let hub = Rc::new(Hub::new(shared.facts, shared.ring, shared.stops, shared.changes));
+        let worker = Rc::clone(&hub);
+        tokio::task::spawn_local(async move { worker.work().await });
+        let places = Arc::new(Semaphore::new(MAX_CLIENTS));
+        tokio::select! {
+            () = accept(&listener, &hub, &places) => {}
+            _ = over => {}
+        }
+        hub.end();
+        let is_read = async {
+            while hub.is_watched() {
+                sleep(REST).await;
+            }
+        };
+        // A watcher that does not read loses its last samples.
+        let _ = timeout(LAST, is_read).await;
+        Ok(())
+    })
+}
+
+/// Accepts clients for ever.
+async fn accept(listener: &UnixListener, hub: &Rc<Hub>, places: &Arc<Semaphore>) {
+    loop {
+        let Ok((stream, _)) = listener.accept().await else {
+            // For example without a free file descriptor.
+            sleep(RETRY).await;
+            continue;
+        };
+        let is_own = stream.peer_cred().is_ok_and(|peer| peer.uid() == Uid::effective().as_raw());
+        if !is_own {
+            continue;
+        }
+        let place = Arc::clone(places).try_acquire_owned();
+        let hub = Rc::clone(hub);
+        tokio::task::spawn_local(async move {
+            let (read, mut write) = stream.into_split();
+            match place {
+                // A client that has gone needs no answer.
+                Ok(_place) => drop(talk(read, &mut write, &hub).await),
+                Err(_) => {
+                    let full = format!("the run has {MAX_CLIENTS} clients already: end one of them");
+                    drop(answer::<()>(&mut write, Err(full)).await);
+                }
+            }
+        });
+    }
+}
+
+/// Answers the requests of a client.
+async fn talk(read: OwnedReadHalf, write: &mut OwnedWriteHalf, hub: &Hub) -> io::Result<()> {
+    let mut reader = BufReader::new(read);
+    loop {
+        let Ok(line) = timeout(MAX_IDLE, read_line(&mut reader)).await else { return Ok(()) };
+        let line = match line? {
+            Line::Whole(line) => line,
+            Line::TooLong => return answer::<()>(write, Err(format!("a line is longer than {MAX_LINE} bytes"))).await,
+            Line::End => return Ok(()),
+        };
+        match serde_json::from_slice(&line) {
+            Err(error) => {
+                answer::<()>(write, Err(format!("this line is no request: {error}; docs/live.md lists them"))).await?;
+                sleep(REST).await;
+            }
+            Ok(Ask::About {}) => {
+                let about = hub.whole().await.map(|both| hub.described.about(&both.0, &both.1));
+                answer(write, about).await?;
+            }
+            Ok(Ask::Get { pattern }) => {
+                let whole = hub.whole().await;
+                let got = whole.and_then(|both| hub.described.got(&both.0, &both.1, pattern.as_deref()));
+                answer(write, got).await?;
+            }
+            Ok(Ask::Set { values }) => answer(write, hub.set(values.into_iter().collect()).await).await?,
+            Ok(Ask::Send { word }) => answer(write, hub.send(&word)).await?,
+            Ok(Ask::Watch { ports, count }) => return watch(&ports, count, &mut reader, write, hub).await,
+        }
+        sleep(PAUSE).await;
+    }
+}
+
+/// Sends samples until their number is reached, the client sends something or goes, or the run ends.
+async fn watch(
+    ports: &[String],
+    count: Option<u64>,
+    reader: &mut BufReader<OwnedReadHalf>,
+    write: &mut OwnedWriteHalf,
+    hub: &Hub,
+) -> io::Result<()> {
+    let mut queue = match hub.watch(ports, count) {
+        Ok(queue) => queue,
+        Err(why) => return answer::<()>(write, Err(why)).await,
+    };
+    let _watching = hub.begin_watching();
+    answer(write, Ok(())).await?;
+    loop {
+        let mut byte = [0];
+        tokio::select! {
+            line = queue.recv() => match line {
+                Some(line) => write.write_all(line.as_bytes()).await?,
+                None => return Ok(()),
+            },
+            _ = reader.read(&mut byte) => return Ok(()),
+        }
+    }
+}
+
+/// Writes an answer. A client that does not read it in time is given up.
+async fn answer<T: Serialize>(write: &mut OwnedWriteHalf, result: Result<T, String>) -> io::Result<()> {
+    let line = Answer::from(result).line();
+    timeout(MAX_WRITE, write.write_all(line.as_bytes())).await.unwrap_or_else(|_| Err(io::ErrorKind::TimedOut.into()))
+}
