@@ -232,8 +232,15 @@ fn garbage_is_refused_and_delays_nobody() {
         (0..50).for_each(|_| _ = flood.write(&noise));
     }
     assert!(session.print(&["get", KP]).contains("4.5"));
-    let idle: Vec<UnixStream> = (0..100).map(|_| UnixStream::connect(session.socket(pid)).unwrap()).collect();
-    let full = session.say(&["send", "stop"]);
+    // The places of the floods are free once the run has closed them, and are taken too.
+    let mut idle = Vec::new();
+    let full = wait_for(
+        || {
+            idle.extend((0..100).map(|_| UnixStream::connect(session.socket(pid)).unwrap()));
+            Some(session.say(&["get", KP])).filter(|said| said.code != 0)
+        },
+        "refusal",
+    );
     assert!(full.code == 2 && full.err.contains("has 64 clients already"), "{}", full.err);
     drop(idle);
     wait_for(|| (session.say(&["get", KP]).code == 0).then_some(()), "place for a client");
@@ -380,34 +387,38 @@ fn limits(summary: &str) -> Vec<String> {
 
 #[test]
 fn random_changes_in_contact_neither_jump_nor_touch_another_limit() {
+    /// Time at which a run is ended and another one is started: the bench of the graph ends at 22 s.
+    const MAX_TIME_S: f64 = 15.0;
     let count: usize = std::env::var("TACTFLOW_SETS").map_or(40, |count| count.parse().expect("a number"));
-    let mut session = Session::new();
-    let pid = session.run(&["graphs/hybrid.toml"]);
-    wait_for(|| (session.about()["tasks"][0]["mode"] == json!("servo")).then_some(()), "mode servo");
-    let (mut setter, mut getter) = (session.connect(pid), session.connect(pid));
-    let (mut random, mut last, mut moved) = (Random::new(18, 2), None::<(f64, f64)>, 0.0);
-    for _ in 0..count {
-        let value = random.uniform(0.5, 6.0);
-        let answer = ask(&mut setter, &json!({"ask": "set", "values": {KP: value}}).to_string());
-        assert_eq!(answer["ok"][0]["to"], json!(value), "{answer}");
-        for _ in 0..4 {
-            let got = ask(&mut getter, &json!({"ask": "get", "pattern": KP}).to_string());
-            let (t, kp) = (got["ok"]["t"].as_f64().unwrap(), got["ok"]["live"][0]["value"].as_f64().unwrap());
-            if let Some((before, old)) = last {
-                assert!((kp - old).abs() <= 2.0 * (t - before) + 1e-9, "{old} to {kp} in {} s", t - before);
-                moved += (kp - old).abs();
+    let (mut random, mut left, mut moved) = (Random::new(18, 2), count, 0.0);
+    while left > 0 {
+        let mut session = Session::new();
+        let pid = session.run(&["graphs/hybrid.toml"]);
+        wait_for(|| (session.about()["tasks"][0]["mode"] == json!("servo")).then_some(()), "mode servo");
+        let (mut setter, mut getter) = (session.connect(pid), session.connect(pid));
+        let mut last = (0.0, None::<f64>);
+        while left > 0 && last.0 < MAX_TIME_S {
+            left -= 1;
+            let value = random.uniform(0.5, 6.0);
+            let answer = ask(&mut setter, &json!({"ask": "set", "values": {KP: value}}).to_string());
+            assert_eq!(answer["ok"][0]["to"], json!(value), "{answer}");
+            for _ in 0..4 {
+                let got = ask(&mut getter, &json!({"ask": "get", "pattern": KP}).to_string());
+                let (t, kp) = (got["ok"]["t"].as_f64().unwrap(), got["ok"]["live"][0]["value"].as_f64().unwrap());
+                if let (before, Some(old)) = last {
+                    assert!((kp - old).abs() <= 2.0 * (t - before) + 1e-9, "{old} to {kp} in {} s", t - before);
+                    moved += (kp - old).abs();
+                }
+                last = (t, Some(kp));
             }
-            last = Some((t, kp));
         }
+        let end = session.end();
+        assert!(!end.out.contains("commands stopped") && !end.out.contains("commands held"), "{}", end.out);
+        let plain = session.print(&["run", "graphs/hybrid.toml", "--for", &format!("{}s", last.0 + 1.0)]);
+        let (touched, allowed) = (limits(&end.out), limits(&plain));
+        assert!(!allowed.is_empty(), "{plain}");
+        let is_allowed = |limit: &String| allowed.contains(limit);
+        assert!(touched.iter().all(is_allowed), "{touched:?}, and without changes {allowed:?}");
     }
     assert!(moved > 0.5, "the gain has moved by {moved} in all");
-    let (t, _) = last.unwrap();
-    let end = session.end();
-    assert!(!end.out.contains("commands stopped") && !end.out.contains("commands held"), "{}", end.out);
-    let plain = session.print(&["run", "graphs/hybrid.toml", "--for", &format!("{}s", t + 1.0)]);
-    let (touched, allowed) = (limits(&end.out), limits(&plain));
-    assert!(
-        !allowed.is_empty() && touched.iter().all(|limit| allowed.contains(limit)),
-        "{touched:?}, and without changes {allowed:?}"
-    );
 }
