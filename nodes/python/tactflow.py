@@ -356,9 +356,12 @@ def main(what: Node, arguments: Optional[Sequence[str]] = None) -> None:
     parsed = parser.parse_args(arguments)
     try:
         if parsed.test:
-            wires = dict(wire.partition("=")[::2] for wire in parsed.wire)
-            recorded = parsed.test.endswith(".mcap")
-            _test(what, _recorded_inputs(what, parsed.test, wires) if recorded else _archived_inputs(what, parsed.test, parsed.pitch * 1e-3))
+            if parsed.test.endswith(".mcap"):
+                wires = dict(wire.partition("=")[::2] for wire in parsed.wire)
+                inputs = _recorded_inputs(what, parsed.test, wires)
+            else:
+                inputs = _archived_inputs(what, parsed.test, parsed.pitch * 1e-3)
+            _test(what, inputs)
         else:
             _serve(what)
     except (BrokenPipeError, KeyboardInterrupt):
@@ -424,6 +427,9 @@ def _archived_inputs(what: Node, path: str, pitch: float) -> Dict[str, List[Any]
 
 def _recorded_inputs(what: Node, path: str, wires: Dict[str, str]) -> Dict[str, List[Any]]:
     """Reads the inputs from a recording: for each value of the first one, the newest values of the others."""
+    strange = sorted(set(wires) - set(what.inputs))
+    if strange:
+        raise SystemExit(f"there is no input {strange}; the inputs are {list(what.inputs)}")
     recording = open(path)
     series = {name: recording[_only_port(recording, wires.get(name, name), name)] for name in what.inputs}
     times = next(iter(series.values())).times

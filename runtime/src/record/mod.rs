@@ -5,6 +5,8 @@ mod output;
 #[cfg(feature = "cli")]
 mod points;
 mod recorder;
+#[cfg(any(feature = "mcap", all(feature = "cli", unix)))]
+mod ring;
 #[cfg(feature = "cli")]
 mod rows;
 mod writer;
@@ -18,6 +20,8 @@ pub use points::{PointPorts, PointRecorder, PointsRequest};
 #[cfg(feature = "mcap")]
 pub(crate) use recorder::mode_line;
 pub use recorder::{Recorded, Recorder};
+#[cfg(any(feature = "mcap", all(feature = "cli", unix)))]
+pub(crate) use ring::touched_ring;
 #[cfg(feature = "cli")]
 pub use rows::{RunColumn, RunRows, TaskModes};
 pub use writer::{RecordFormat, RowFormat};

@@ -82,7 +82,7 @@ impl Recorder {
     /// Records the last tick. While the ring is full, waits as long as `may_wait` returns true; then the row is lost.
     pub fn record(&mut self, engine: &Engine, may_wait: impl Fn() -> bool) {
         self.recorded += 1;
-        let began = engine.began().unwrap_or(Beginning { time: engine.now(), wall: 0 });
+        let began = engine.began().unwrap_or(Beginning { time: engine.now(), wall: 0, by: 0 });
         let (times, row) = self.row.split_at_mut(self.own[0]);
         for (cell, time) in times.iter_mut().zip([began.time, began.wall]) {
             // The ring holds floats. Storing the bits keeps the time in nanoseconds exact; its value would be rounded.

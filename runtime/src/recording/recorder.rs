@@ -6,16 +6,16 @@ use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
 
-use rtrb::{Producer, RingBuffer};
+use rtrb::Producer;
 
 use super::about::Contents;
 use super::channels::Channels;
-use super::ring::{FRAME_HEAD, INPUTS_FRAME, INPUTS_HEAD, Losses, PORTS_FRAME, push, touch};
+use super::ring::{FRAME_HEAD, INPUTS_FRAME, INPUTS_HEAD, Losses, PORTS_FRAME, push};
 use super::snapshot::Snapshot;
 use super::writer::{FILE_START, Files, write_files};
 use crate::engine::{End, Engine};
 use crate::graph::Request;
-use crate::record::{OutputFile, Writing, not_read};
+use crate::record::{OutputFile, Writing, not_read, touched_ring};
 
 /// Time of ticks for which the ring has room [ns].
 const RING_TIME: i64 = 2_000_000_000;
@@ -84,8 +84,7 @@ impl RunRecorder {
         let ticks = (RING_TIME / engine.period().max(1)) as usize;
         let capacity =
             tick.saturating_mul(ticks.max(16)).clamp(*RING_BYTES.start(), (*RING_BYTES.end()).max(16 * tick));
-        let (mut ring, mut drain) = RingBuffer::new(capacity);
-        touch(&mut ring, &mut drain);
+        let (ring, drain) = touched_ring(capacity);
         let (losses, end) = (Arc::<Losses>::default(), Arc::default());
         let (shared, reason) = (Arc::clone(&losses), Arc::clone(&end));
         let files = Files {

@@ -29,17 +29,6 @@ pub(super) struct Losses {
     pub(super) has_end: AtomicBool,
 }
 
-/// Writes every byte of the ring once, so that no tick waits for the operating system to provide the memory.
-pub(super) fn touch(ring: &mut Producer<u8>, drain: &mut Consumer<u8>) {
-    let zeros = [0; 1 << 16];
-    while ring.slots() > 0 {
-        let _ = ring.push_partial_slice(&zeros);
-    }
-    if let Ok(chunk) = drain.read_chunk(drain.slots()) {
-        chunk.commit_all();
-    }
-}
-
 /// Adds a frame to the ring if `spare` bytes are left behind it. Returns whether there was room.
 pub(super) fn push(
     ring: &mut Producer<u8>,

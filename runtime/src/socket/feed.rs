@@ -7,11 +7,12 @@
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 
-use rtrb::{Consumer, Producer, RingBuffer};
+use rtrb::{Consumer, Producer};
 
 use crate::engine::Engine;
 use crate::graph::PlannedPort;
 use crate::node::PortId;
+use crate::record::touched_ring;
 use crate::signal::Kind;
 
 /// Types of frames.
@@ -141,8 +142,7 @@ pub(super) fn feed(engine: &Engine) -> (Feed, FeedReader, Arc<Wishes>) {
     let (tasks, live) = (engine.tasks().len(), engine.live_values().count());
     // A port that is watched has its number too.
     let longest = HEAD + 2 * tasks + 2 * live + widths.iter().map(|width| width + 2).sum::<usize>();
-    let (mut ring, mut drain) = RingBuffer::new(MIN_WORDS.max(MIN_FRAMES * longest));
-    touch(&mut ring, &mut drain);
+    let (ring, drain) = touched_ring(MIN_WORDS.max(MIN_FRAMES * longest));
     let wishes = Arc::new(Wishes {
         whole: AtomicBool::new(false),
         is_any_watched: AtomicBool::new(false),
@@ -152,17 +152,6 @@ pub(super) fn feed(engine: &Engine) -> (Feed, FeedReader, Arc<Wishes>) {
     let row = vec![0.0; widths.iter().copied().max().unwrap_or(0)];
     let feed = Feed { ports, row, frame: Vec::with_capacity(longest), ring, wishes: Arc::clone(&wishes) };
     (feed, FeedReader { widths, tasks, live, ring: drain, frame: Vec::new() }, wishes)
-}
-
-/// Writes every word of the ring once, so that no tick waits for the operating system to provide the memory.
-fn touch(ring: &mut Producer<u64>, drain: &mut Consumer<u64>) {
-    let zeros = [0; 1 << 12];
-    while ring.slots() > 0 {
-        let _ = ring.push_partial_slice(&zeros);
-    }
-    if let Ok(chunk) = drain.read_chunk(drain.slots()) {
-        chunk.commit_all();
-    }
 }
 
 impl Feed {

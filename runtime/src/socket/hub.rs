@@ -56,7 +56,7 @@ struct Watcher {
     /// Columns, in their order, each with the name under which it is sent.
     columns: Vec<(usize, String)>,
     queue: mpsc::Sender<String>,
-    /// Samples that it has lost and was not told of.
+    /// Samples that it has lost since the last line that it was sent.
     lost: u64,
     /// Samples until it ends.
     left: Option<u64>,

@@ -215,18 +215,13 @@ impl PortText {
             let unit = self.unit.as_deref().ok_or_else(|| format!("output `{name}` has no `unit`: `1` is one too"))?;
             parse(name, unit)
         };
+        let has_only = |known: &[&str]| self.has_only("output", known);
         match &*self.kind {
-            "scalar" => self.has_only("output", &["unit"])?,
-            "flag" => self.has_only("output", &[])?,
-            "features" => self.has_only("output", &["features"])?,
-            "image" => self.has_only("output", &["unit", "rows", "cols", "pitch"])?,
-            _ => {}
-        }
-        match &*self.kind {
-            "scalar" => unit().map(OutputShape::Scalar),
-            "flag" => Ok(OutputShape::Flag),
+            "scalar" => has_only(&["unit"]).and_then(|()| unit()).map(OutputShape::Scalar),
+            "flag" => has_only(&[]).map(|()| OutputShape::Flag),
             "features" if self.features.is_empty() => Err(format!("output `{name}` names no `features`")),
             "features" => {
+                has_only(&["features"])?;
                 names(self.features.iter().map(|feature| &feature.name), "features")?;
                 let units = self
                     .features
@@ -236,6 +231,7 @@ impl PortText {
                 Ok(OutputShape::Features(FeaturesShape::new(units?)))
             }
             "image" => {
+                has_only(&["unit", "rows", "cols", "pitch"])?;
                 let (Some(rows), Some(cols), Some(pitch)) = (self.rows, self.cols, self.pitch) else {
                     return Err(format!("the image `{name}` needs `rows`, `cols` and `pitch`"));
                 };

@@ -96,7 +96,7 @@ pub(crate) fn draw(args: DrawArgs, shell: &Shell) -> u8 {
 
 fn picture(args: &DrawArgs, shell: &Shell) -> Result<Picture, u8> {
     #[cfg(feature = "mcap")]
-    if recorded::is_recording(&args.graph) {
+    if super::shell::replays::is_recording(&args.graph) {
         return recorded::picture(args, shell);
     }
     let request = args.graph_args.request(args.graph.clone());

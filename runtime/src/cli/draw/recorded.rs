@@ -1,30 +1,20 @@
 //! The graph of a recording, and the time that each of its nodes takes: the recording is replayed once.
 
 use std::collections::HashMap;
-use std::path::Path;
 
 use super::picture::Picture;
 use super::{DrawArgs, modes, wires};
 use crate::cli::shell::Shell;
 use crate::cli::shell::panics::without_panic_messages;
 use crate::engine::Engine;
-use crate::recording::{Replay, ReplayChanges, ReplayError, ReplayedTick};
-
-/// Whether a file is a recording.
-pub(super) fn is_recording(path: &Path) -> bool {
-    path.extension().is_some_and(|ending| ending == "mcap")
-}
+use crate::recording::{Replay, ReplayChanges, ReplayedTick};
 
 /// Returns the picture of a recording.
 pub(super) fn picture(args: &DrawArgs, shell: &Shell) -> Result<Picture, u8> {
     if args.graph_args.is_given() {
         return Err(shell.refuse("a recording has its own bench and values: leave out `--bench` and `--set`"));
     }
-    let replay = Replay::open(shell.catalogue(), &args.graph, &ReplayChanges::default());
-    let mut replay = replay.map_err(|error| match error {
-        ReplayError::Message(message) => shell.refuse(message),
-        ReplayError::Graph(report) => shell.reject(&report),
-    })?;
+    let mut replay = shell.open_replay(&args.graph, &ReplayChanges::default())?;
     let title = args.graph.display().to_string();
     if args.modes {
         return Ok(modes::picture(replay.outline(), title));

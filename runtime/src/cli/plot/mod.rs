@@ -83,7 +83,7 @@ fn make(args: &PlotArgs) -> Result<String, String> {
 
 fn read(path: &Path) -> Result<RunRows, String> {
     #[cfg(feature = "mcap")]
-    if path.extension().is_some_and(|ending| ending == "mcap") {
+    if super::shell::replays::is_recording(path) {
         return crate::recording::rows(path);
     }
     if RecordFormat::of(path).is_none() {

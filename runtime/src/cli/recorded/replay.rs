@@ -14,7 +14,7 @@ use crate::cli::text::prose::PageStyle;
 use crate::engine::{End, Outcome};
 use crate::fault::Fault;
 use crate::record::{RecordFormat, Recorder};
-use crate::recording::{PortDifference, Replay, ReplayChanges, ReplayError, ReplayedTick, is_own_channel};
+use crate::recording::{PortDifference, Replay, ReplayChanges, ReplayedTick, is_own_channel};
 use crate::source::quoted;
 
 /// Repeat a recorded run without its devices, and compare every recorded port
@@ -62,10 +62,9 @@ pub(super) struct ReplayArgs {
 
 pub(super) fn replay(args: ReplayArgs, shell: &Shell) -> u8 {
     let changes = ReplayChanges { graph: args.graph.clone(), bench: args.bench.clone(), set: args.set.clone() };
-    let replay = match Replay::open(shell.catalogue(), &args.recording, &changes) {
+    let replay = match shell.open_replay(&args.recording, &changes) {
         Ok(replay) => replay,
-        Err(ReplayError::Message(message)) => return shell.refuse(message),
-        Err(ReplayError::Graph(report)) => return shell.reject(&report),
+        Err(code) => return code,
     };
     let run = Run { args: &args, replay, is_other: !changes.is_empty(), begin: Instant::now(), faulted: None };
     run.run(shell).unwrap_or_else(|message| {

@@ -25,8 +25,8 @@ pub(super) struct Lateness {
 impl Lateness {
     /// Adds the last tick; nothing in virtual time.
     pub(super) fn add(&mut self, engine: &Engine) {
-        if let Some(by) = engine.punctuality().by() {
-            self.ticks.push([engine.now() as f64 * 1e-9, by as f64 * 1e-6]);
+        if let Some(began) = engine.began() {
+            self.ticks.push([engine.now() as f64 * 1e-9, began.by as f64 * 1e-6]);
         }
     }
 

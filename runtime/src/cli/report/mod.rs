@@ -8,9 +8,10 @@ use std::path::{Path, PathBuf};
 
 use page::HtmlPage;
 
+use super::shell::replays::is_recording;
 use super::shell::{FAULTED, NOT_LOADED, Shell};
 use super::verify;
-use crate::recording::{Replay, ReplayChanges, ReplayError};
+use crate::recording::ReplayChanges;
 
 /// Show recorded runs and the results of scenarios on one page for a browser
 #[derive(clap::Parser)]
@@ -36,10 +37,6 @@ pub(super) struct ReportArgs {
     /// Run each scenario that has `seeds` with the seeds 1 to N instead of its own
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..=10_000))]
     seeds: Option<u64>,
-}
-
-fn is_recording(file: &Path) -> bool {
-    file.extension().is_some_and(|end| end == "mcap")
 }
 
 fn has_toml(folder: &Path) -> bool {
@@ -87,11 +84,7 @@ pub(super) fn report(args: ReportArgs, shell: &Shell) -> Result<u8, u8> {
     }
     let mut code = 0;
     for path in recordings {
-        let replay = Replay::open(shell.catalogue(), &path, &ReplayChanges::default());
-        let replay = replay.map_err(|error| match error {
-            ReplayError::Message(message) => shell.refuse(message),
-            ReplayError::Graph(report) => shell.reject(&report),
-        })?;
+        let replay = shell.open_replay(&path, &ReplayChanges::default())?;
         let name = path.display().to_string();
         if let Some(difference) = run::add(&mut page, &name, replay).map_err(|message| shell.refuse(message))? {
             shell.error(format_args!("{name}: {difference}"));

@@ -22,7 +22,7 @@ use std::sync::Arc;
 
 use files::OutputFiles;
 use log::NodeLog;
-use outside::{Live, changes};
+use outside::{Outside, changes};
 use progress::Progress;
 use summary::Summary;
 
@@ -215,7 +215,7 @@ impl Job {
         let (sends, listens) = (send.clone(), *listen);
         let mut options =
             RunOptions { duration: *duration, is_realtime: *realtime, sends, listens, ..RunOptions::default() };
-        let Live { mut changes, mut socket } = Live::open(changes, facts, &engine, &mut options, shell);
+        let Outside { mut changes, mut socket } = Outside::open(changes, facts, &engine, &mut options, shell);
         let outcome = without_panic_messages(|| {
             let mut observe = |engine: &Engine| {
                 summary.add(engine);

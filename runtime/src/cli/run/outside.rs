@@ -8,7 +8,7 @@ use crate::graph::{Compiled, Request, compile};
 use crate::socket::{Feed, OpenedSocket, RunFacts, RunSocket, open};
 
 /// What may change a run from outside.
-pub(crate) struct Live<'s> {
+pub(crate) struct Outside<'s> {
     pub(crate) changes: Option<ScheduledChanges<'s>>,
     pub(crate) socket: Option<OpenSocket>,
 }
@@ -62,7 +62,7 @@ pub(crate) fn changes<'s>(
     ScheduledChanges::new(changer, &job.options.change).map(Some)
 }
 
-impl<'s> Live<'s> {
+impl<'s> Outside<'s> {
     /// Opens the socket, if the run has one. If it cannot be opened, the run goes on with a warning.
     #[cfg(unix)]
     pub(crate) fn open(

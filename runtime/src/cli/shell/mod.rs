@@ -4,6 +4,8 @@ pub(super) mod command;
 pub(super) mod json;
 pub(super) mod panics;
 pub(super) mod patience;
+#[cfg(feature = "mcap")]
+pub(super) mod replays;
 pub(super) mod stream;
 
 use std::fmt::Display;

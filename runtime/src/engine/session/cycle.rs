@@ -31,7 +31,7 @@ impl Engine {
         self.core.begin(now);
         let late = self.lateness.take();
         if let Some(log) = &mut self.inputs {
-            log.begin(&self.core.tick, late, self.punctuality.by());
+            log.begin(&self.core.tick, late, self.punctuality.last.map(|began| began.by));
         }
         self.live.take(&mut self.core, self.inputs.as_deref_mut());
         if let Some(by) = late {

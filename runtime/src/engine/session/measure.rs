@@ -22,7 +22,7 @@ impl Engine {
         let cause =
             last.and_then(|last| self.use_of_tick(last, Duration::from_nanos((time - last.time).unsigned_abs())));
         self.timing.is_always_on |= is_late;
-        self.punctuality.count(Beginning { time, wall }, by, cause);
+        self.punctuality.count(Beginning { time, wall, by }, cause);
     }
 
     /// Calls `observe` with this engine after a tick, and notes how long that took if every tick is timed.

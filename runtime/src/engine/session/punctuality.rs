@@ -9,6 +9,8 @@ pub struct Beginning {
     pub time: i64,
     /// Wall clock: time since 1970 in UTC [ns].
     pub wall: i64,
+    /// How late it began [ns].
+    pub by: i64,
 }
 
 /// A tick that began late.
@@ -52,8 +54,6 @@ impl TickUse {
 pub struct Punctuality {
     /// The last tick.
     pub(super) last: Option<Beginning>,
-    /// How late it began [ns].
-    pub(super) last_by: i64,
     /// Number of ticks by their lateness: below each of [`BOUNDS_NS`](Self::BOUNDS_NS), and above the last.
     pub counts: [u64; Self::BOUNDS_NS.len() + 1],
     /// The tick that was latest.
@@ -70,8 +70,9 @@ impl Punctuality {
     /// Bounds of the histogram of lateness [ns].
     pub const BOUNDS_NS: [i64; 5] = [100_000, 300_000, 1_000_000, 3_000_000, 10_000_000];
 
-    /// Counts a tick that began `by` [ns] late, because of `cause`.
-    pub(super) fn count(&mut self, began: Beginning, by: i64, cause: Option<TickUse>) {
+    /// Counts a tick. `cause` is what made it late.
+    pub(super) fn count(&mut self, began: Beginning, cause: Option<TickUse>) {
+        let Beginning { time, by, .. } = began;
         if let Some(cause) = cause.as_ref().filter(|cause| cause.has_culprit()) {
             match self.culprits.iter_mut().find(|(name, _)| *name == cause.slowest) {
                 Some((_, longest)) => *longest = cause.took.max(*longest),
@@ -81,15 +82,9 @@ impl Punctuality {
         let bin = Self::BOUNDS_NS.iter().position(|bound| by < *bound).unwrap_or(Self::BOUNDS_NS.len());
         self.counts[bin] += 1;
         if by > self.worst.by {
-            self.worst = LateTick { time: began.time, by, cause };
+            self.worst = LateTick { time, by, cause };
         }
-        (self.last, self.last_by) = (Some(began), by);
-    }
-
-    /// Returns how late the last tick began [ns]; `None` in virtual time.
-    #[must_use]
-    pub fn by(&self) -> Option<i64> {
-        self.last.map(|_| self.last_by)
+        self.last = Some(began);
     }
 
     /// Notes how long a device took in this tick.
@@ -109,7 +104,7 @@ mod tests {
     fn a_tick_is_counted_by_its_lateness() {
         let mut punctuality = Punctuality::default();
         for (time, by) in [(0, 0), (5, 99_999), (7, 100_000), (9, 999_999), (20, 12_000_000), (30, 10_000_000)] {
-            punctuality.count(Beginning { time, wall: 0 }, by, None);
+            punctuality.count(Beginning { time, wall: 0, by }, None);
         }
         assert_eq!(punctuality.counts, [2, 1, 1, 0, 0, 2]);
         assert_eq!(punctuality.worst, LateTick { time: 20, by: 12_000_000, cause: None });
@@ -131,7 +126,7 @@ mod tests {
             (4, 8, Some(use_of("a", 11, 12))),
             (5, 5, None),
         ] {
-            punctuality.count(Beginning { time, wall: 0 }, by * 1_000_000, cause);
+            punctuality.count(Beginning { time, wall: 0, by: by * 1_000_000 }, cause);
         }
         let worst = punctuality.worst;
         assert_eq!((worst.time, worst.cause.map(|cause| cause.slowest)), (2, Some("c".into())));

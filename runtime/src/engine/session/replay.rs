@@ -72,7 +72,7 @@ impl Engine {
         let Some(now) = now else { return Err("the inputs contain no tick".into()) };
         self.live.replay(&values)?;
         if let Some(by) = began {
-            self.punctuality.count(Beginning { time: now.saturating_add(by), wall: 0 }, by, None);
+            self.punctuality.count(Beginning { time: now.saturating_add(by), wall: 0, by }, None);
         }
         self.replayed = Some(has_sampled);
         Ok(self.tick(now))

@@ -73,7 +73,7 @@ impl<'c> ScheduledChanges<'c> {
 
     /// Waits for a request, and carries it out. Between two requests, steps are prepared.
     fn wait(&mut self, time: Duration) {
-        let Some(requests) = &self.requests else { return std::thread::sleep(LOOK) };
+        let Some(requests) = &self.requests else { return std::thread::sleep(time) };
         match requests.recv_timeout(time) {
             Ok(ChangeRequest { values, answer }) => answer(self.changer.set_all(&values)),
             Err(RecvTimeoutError::Timeout) => {}

@@ -11,8 +11,7 @@ use crate::source::{Code, Diagnostic, Diagnostics, Item, Table};
 pub(crate) fn add_models(bench: &mut BenchDocument, catalogue: &Catalogue, diagnostics: &mut Diagnostics) {
     for (from, model) in &bench.models {
         let what = from.what;
-        // The name of a misspelt device has been corrected: its place is still the same.
-        let Some(block) = bench.devices.iter_mut().find(|block| block.key.span == from.device.span) else { continue };
+        let Some(block) = bench.devices.iter_mut().find(|block| block.key.name == from.device.name) else { continue };
         let Some(device) = block.kind.as_ref().and_then(|kind| catalogue.find_device(&kind.value)) else { continue };
         let own = device.params();
         let (mut table, before) = (Table::default(), diagnostics.len());

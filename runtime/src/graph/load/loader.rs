@@ -76,9 +76,7 @@ impl Loader {
         let settings = root.0.get("graph").cloned();
         let task = Task { place: root.1, settings, ends_run: true, ..Task::default() };
         flat.bench = self.bench(request, (&document, &task), &root.0, bench_set);
-        flat.bench.iter_mut().for_each(|bench| self.models(bench));
-        let bench = flat.bench.as_mut();
-        self.diagnostics.extend(bench.into_iter().flat_map(|bench| bench.correct_names(&self.sources)));
+        flat.bench.iter_mut().for_each(|bench| self.complete(bench));
         let binds = flat.bench.as_ref().map(|bench| bench.bind.clone()).unwrap_or_default();
         self.diagnostics.extend(document.correct_names(&binds, &[], &self.sources));
         for (name, kind) in &self.joined {
@@ -156,10 +154,15 @@ impl Loader {
     /// Reads a bench file, and the files of its robots.
     pub(crate) fn load_bench(&mut self, path: &Path) -> Option<BenchDocument> {
         let mut bench = self.bench_file(path, None, Table::default())?;
-        self.models(&mut bench);
+        self.complete(&mut bench);
+        Some(bench)
+    }
+
+    /// Corrects the names of the devices of a bench, and then reads the files of their robots and sensors.
+    fn complete(&mut self, bench: &mut BenchDocument) {
         let corrected = bench.correct_names(&self.sources);
         self.diagnostics.extend(corrected);
-        Some(bench)
+        self.models(bench);
     }
 
     fn bench_file(&mut self, path: &Path, from: Option<Range<usize>>, set: Table) -> Option<BenchDocument> {

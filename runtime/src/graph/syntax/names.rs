@@ -165,7 +165,14 @@ impl BenchDocument {
     pub(crate) fn correct_names(&mut self, sources: &SourceMap) -> Diagnostics {
         let uses: Vec<Use> = self.bind.iter().map(|(_, binding)| Use::of(&binding.word)).collect();
         let devices = self.devices.iter_mut().map(|device| &mut device.key);
-        correct(Code::UnknownDevice, devices, &uses, &|_, _| true, false, sources)
+        let found = correct(Code::UnknownDevice, devices, &uses, &|_, _| true, false, sources);
+        // The files of a device go with it.
+        for from in &mut self.model_files {
+            if let Some(device) = self.devices.iter().find(|device| device.key.span == from.device.span) {
+                from.device = device.key.clone();
+            }
+        }
+        found
     }
 }
 
