@@ -13,6 +13,11 @@ pub(crate) fn recorded(args: &[&str], for_s: &str) -> Vec<BTreeMap<String, f64>>
     let (_folder, path) = in_new_folder("run.csv");
     let run = say(&[&["run"], args, &["--quiet", "--for", for_s, "--out", &path]].concat());
     assert_eq!(run.code, 0, "{}", run.err);
+    rows(&path)
+}
+
+/// The rows of a file in CSV, each by the names of its columns; absent values are left out.
+pub(crate) fn rows(path: &str) -> Vec<BTreeMap<String, f64>> {
     let text = fs::read_to_string(path).unwrap();
     let mut lines = text.lines().filter(|line| !line.starts_with('#'));
     let names: Vec<&str> = lines.next().unwrap().split(',').collect();

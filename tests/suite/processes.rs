@@ -1,6 +1,7 @@
 //! Programs in other languages, as nodes beside the tick and as pads: docs/processes.md.
 
 use std::fs;
+use std::path::Path;
 use std::process::{Command, Stdio};
 use std::thread::sleep;
 use std::time::{Duration, Instant};
@@ -11,6 +12,7 @@ use tactflow_runtime::signal::Freshness;
 use tactflow_tests::{catalogue, workspace};
 
 use crate::cli::in_new_folder;
+use crate::control_law::rows;
 use crate::record::has_python_module;
 use crate::tool::{Said, said, tool};
 
@@ -283,16 +285,17 @@ fn the_python_package_states_runs_and_reads() {
     }
     let examples = workspace().join("nodes/python/examples");
     let package = workspace().join("nodes/python");
-    for name in ["contact", "wave_pad"] {
+    for path in ["contact", "wave_pad", "slip/slip"] {
+        let name = Path::new(path).file_name().unwrap().display();
         let (folder, out) = in_new_folder("stated.node.toml");
         // It runs in the folder of its signature.
-        fs::copy(examples.join(format!("{name}.py")), folder.path().join("program.py")).unwrap();
+        fs::copy(examples.join(format!("{path}.py")), folder.path().join("program.py")).unwrap();
         let mut stated = tool(&["signature", "--out", &out, "--", "python3", "program.py"]);
         let stated = said(stated.env("PYTHONPATH", &package));
         assert_eq!((stated.code, stated.err.as_str()), (0, ""), "{}", stated.out);
         let body = |text: String| text.lines().skip(1).map(str::to_owned).collect::<Vec<_>>();
         let written = body(fs::read_to_string(&out).unwrap());
-        let shipped = body(fs::read_to_string(examples.join(format!("{name}.node.toml"))).unwrap());
+        let shipped = body(fs::read_to_string(examples.join(format!("{path}.node.toml"))).unwrap());
         assert_eq!(written, shipped, "{name}.node.toml is not what the example states");
     }
     let look = ["run", "nodes/python/examples/look.toml", "--for", "1s"];
@@ -334,4 +337,29 @@ fn the_python_package_states_runs_and_reads() {
     let is_there = |pressure: &f64| (pressure - in_run).abs() < 1e-5 * in_run;
     assert!(pressures.iter().rev().take(3).any(is_there), "{in_run} N/tactel, and {pressures:?}");
     drop(folder);
+}
+
+#[test]
+fn a_network_in_python_sees_the_object_slip() {
+    if !has_python_module("numpy") {
+        return;
+    }
+    let (_folder, csv) = in_new_folder("run.csv");
+    let graph = "nodes/python/examples/slip/slip.toml";
+    let ran = ["run", graph, "--quiet", "--set", "devices.bench.seed=77", "--out", &csv];
+    let ran = said(tool(&ran).env("PYTHONPATH", workspace().join("nodes/python")));
+    assert_eq!(ran.code, 0, "{}", ran.err);
+    let rows = rows(&csv);
+    // How often it says so from a time of the graph to another one [s].
+    let share = |from: f64, to: f64| {
+        let during = rows.iter().filter(|row| row["time"] >= from && row["time"] < to);
+        let said: Vec<f64> = during.map(|row| row["slip.slips"]).collect();
+        said.iter().sum::<f64>() / said.len() as f64
+    };
+    // The ball is drawn along the pad, slowly and fast.
+    assert!(share(4.4, 5.6) > 0.9 && share(7.1, 7.9) > 0.9, "{} and {}", share(4.4, 5.6), share(7.1, 7.9));
+    // It rests, and it is pushed against the pad.
+    for (from, to) in [(2.0, 4.0), (6.3, 7.0), (8.2, 9.0), (9.0, 12.0)] {
+        assert!(share(from, to) < 0.05, "{} from {from} s to {to} s", share(from, to));
+    }
 }
