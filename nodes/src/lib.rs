@@ -76,6 +76,11 @@ fn edge() -> Catalogue {
         .device::<devices::agni::Agni>()
         .device::<devices::lwr_fri::LwrFri>()
         .device::<devices::ur::Ur>();
+    #[cfg(feature = "ros2")]
+    let catalogue = catalogue
+        .device::<devices::ros2::Ros2Pad>()
+        .device::<devices::ros2::Ros2Force>()
+        .device::<devices::ros2::Ros2Arm>();
     #[cfg(feature = "process")]
     let catalogue = catalogue.device::<devices::process::Process>();
     #[cfg(feature = "cli")]

@@ -80,6 +80,8 @@ mod report;
 mod reports;
 mod resume;
 mod robots;
+#[cfg(feature = "ros2")]
+mod ros2;
 mod self_test;
 #[cfg(unix)]
 mod signals;

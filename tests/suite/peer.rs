@@ -46,6 +46,12 @@ impl Process {
         Self { child, words, said }
     }
 
+    /// The number of the process.
+    #[cfg(feature = "ros2")]
+    pub(crate) fn id(&self) -> u32 {
+        self.child.id()
+    }
+
     /// Says a line to the script.
     pub(crate) fn say(&mut self, line: &str) {
         writeln!(self.words, "{line}").unwrap();

@@ -3,9 +3,13 @@
 use std::borrow::Cow;
 
 use tactflow_runtime::device::{Fill, Output};
+#[cfg(feature = "drivers")]
+use tactflow_runtime::node::{FilePath, Mistakes};
 use tactflow_runtime::signal::{Image, ImageShape, Unit};
 
 use super::Facts;
+#[cfg(feature = "drivers")]
+use super::arm::fact_of;
 use crate::arm::mount::Mount;
 
 /// The type of the role of a pad.
@@ -32,6 +36,43 @@ pub(crate) fn facts(threshold: f64, pressure: f64, unit: Unit, calibration: toml
         ("pressure".into(), format!("{pressure} {}", unit.per_tactel()).into()),
         ("calibration".into(), calibration.into()),
     ]
+}
+
+/// What a pad of any make states of itself.
+#[cfg(feature = "drivers")]
+pub(crate) struct PadFacts<'p> {
+    pub(crate) unit: Unit,
+    pub(crate) threshold: Option<f64>,
+    pub(crate) pressure: Option<f64>,
+    pub(crate) calibration: Option<&'p FilePath>,
+    pub(crate) mount: Option<&'p Mount>,
+    pub(crate) rest_frames: usize,
+    pub(crate) tare_bound: Option<f64>,
+}
+
+#[cfg(feature = "drivers")]
+impl PadFacts<'_> {
+    /// Returns the facts. With a calibration, the threshold and the pressure are in N.
+    ///
+    /// # Errors
+    /// If the path of the calibration cannot be a fact.
+    pub(crate) fn facts(&self) -> Result<Facts, Mistakes> {
+        let mut calibration = toml::Table::new();
+        match self.calibration {
+            Some(file) => calibration.insert("file".to_owned(), fact_of("calibration", file)?.into()),
+            None => calibration.insert("gain".to_owned(), 1.0.into()),
+        };
+        // What `calibrate` makes of the image.
+        let unit = if self.calibration.is_some() { Unit::NEWTON } else { self.unit };
+        let mut facts: Facts =
+            vec![("dead".into(), toml::Value::Array(Vec::new())), ("calibration".into(), calibration.into())];
+        facts.extend(self.threshold.map(|threshold| ("threshold".into(), format!("{threshold} {unit}").into())));
+        let pressure = self.pressure.map(|pressure| format!("{pressure} {}", unit.per_tactel()));
+        facts.extend(pressure.map(|pressure| ("pressure".into(), pressure.into())));
+        facts.extend(self.mount.map(mount));
+        facts.extend(rest(self.rest_frames, self.tare_bound, self.unit));
+        Ok(facts)
+    }
 }
 
 /// Number of frames of the self-test of a pad, if its bench does not set it.

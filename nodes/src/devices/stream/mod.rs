@@ -12,9 +12,9 @@ mod reader;
 
 use tactflow_runtime::device::{Description, Device, Driver, Opened, Output};
 use tactflow_runtime::node::{Describe, Mistakes};
-use tactflow_runtime::signal::{Image, ImageShape, Unit};
+use tactflow_runtime::signal::{Image, ImageShape};
 
-use super::{Facts, arm, pad};
+use super::{Facts, pad};
 #[cfg(feature = "cli")]
 pub(crate) use decoding::order::{Grid, Turn};
 use driver::PadDriver;
@@ -84,21 +84,16 @@ impl Device for Stream {
 }
 
 fn facts(params: &Params) -> Result<Facts, Mistakes> {
-    let mut calibration = toml::Table::new();
-    match &params.calibration {
-        Some(file) => calibration.insert("file".to_owned(), arm::fact_of("calibration", file)?.into()),
-        None => calibration.insert("gain".to_owned(), 1.0.into()),
+    let facts = pad::PadFacts {
+        unit: params.unit,
+        threshold: params.threshold,
+        pressure: params.pressure,
+        calibration: params.calibration.as_ref(),
+        mount: params.mount.as_ref(),
+        rest_frames: params.rest_frames,
+        tare_bound: params.tare_bound,
     };
-    // What `calibrate` makes of the image.
-    let unit = if params.calibration.is_some() { Unit::NEWTON } else { params.unit };
-    let mut facts: Facts =
-        vec![("dead".into(), toml::Value::Array(Vec::new())), ("calibration".into(), calibration.into())];
-    facts.extend(params.threshold.map(|threshold| ("threshold".into(), format!("{threshold} {unit}").into())));
-    let pressure = params.pressure.map(|pressure| format!("{pressure} {}", unit.per_tactel()));
-    facts.extend(pressure.map(|pressure| ("pressure".into(), pressure.into())));
-    facts.extend(params.mount.as_ref().map(pad::mount));
-    facts.extend(pad::rest(params.rest_frames, params.tare_bound, params.unit));
-    Ok(facts)
+    facts.facts()
 }
 
 #[cfg(test)]

@@ -1,0 +1,193 @@
+//! `ros2_arm`: an arm behind topics.
+
+use std::time::Duration;
+
+use tactflow_runtime::device::{Description, Device, Driver, OnSilence, Opened};
+use tactflow_runtime::node::{At, Describe, FilePath, Mistake, Mistakes, Param};
+use tactflow_runtime::signal::JointsShape;
+use tactflow_runtime::source::Code;
+
+use super::driver::ArmDriver;
+use super::output::Commanded;
+use super::place::{Place, check_topic};
+use crate::arm::model::load;
+use crate::arm::mount::Mount;
+use crate::devices::arm::{self, ArmPorts};
+use crate::devices::start::{StartBounds, StartCheck};
+
+/// Time that a controller needs to take a message and to act on it, at most [s].
+const REACTION_S: f64 = 0.02;
+
+/// The type of the commands.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Param)]
+enum Kind {
+    /// `trajectory_msgs/msg/JointTrajectory`: each message ends at rest.
+    Trajectory,
+    /// `std_msgs/msg/Float64MultiArray`: velocities [rad/s] in the order of `joints`. Something on the robot must stop it
+    /// when no message comes: see `watchdog_ms`.
+    Velocity,
+}
+
+/// Parameters of `ros2_arm`.
+#[derive(Debug, Clone, Param)]
+pub struct Params {
+    /// The topic of `sensor_msgs/msg/JointState`.
+    #[param(default = "/joint_states")]
+    states: String,
+    /// The topic of the commands, such as `/joint_trajectory_controller/joint_trajectory`.
+    command: String,
+    /// The type of the commands.
+    #[param(default = Kind::Trajectory)]
+    message: Kind,
+    /// Names of the joints on the robot, in the order of the model from its root; those of the model if not given.
+    joints: Option<Vec<String>>,
+    #[param(flatten)]
+    place: Place,
+    /// The arm's model.
+    urdf: FilePath,
+    /// Link that carries the sensor.
+    tip: String,
+    /// Posture that the arm prefers, stated as a fact.
+    #[param(unit = "rad")]
+    home: Option<Vec<f64>>,
+    /// Posture from which runs begin. A run refuses to move an arm that is elsewhere, and the check knows where the sensor
+    /// starts.
+    #[param(unit = "rad")]
+    start: Option<Vec<f64>>,
+    /// Bounds of the checks before the first command.
+    #[param(default = StartBounds::default())]
+    start_bounds: StartBounds,
+    /// Maximum acceleration of each joint.
+    #[param(unit = "rad/s2", above = 0.0, default = 10.0)]
+    acceleration: f64,
+    /// Joint states per second.
+    #[param(unit = "Hz", range = 10.0..=2000.0)]
+    rate_hz: f64,
+    /// Time without a joint state after which the arm is lost.
+    #[param(unit = "ms", range = 10.0..=10_000.0, default = 200.0)]
+    timeout_ms: f64,
+    /// How far a trajectory goes on before it slows down. It must bridge the time between two commands and the delay of
+    /// the network.
+    #[param(unit = "ms", range = 5.0..=200.0, default = 40.0)]
+    horizon_ms: f64,
+    /// Largest difference between the clock of the robot and that of this machine. A command of the type `trajectory`
+    /// states when it was made, so that one that arrives late does not move the arm.
+    #[param(unit = "ms", above = 0.0, default = 20.0)]
+    clock_bound_ms: f64,
+    /// Time without a command after which the robot stops by itself. Velocities need it: state here what the controller
+    /// on the robot does.
+    #[param(unit = "ms", range = 1.0..=1000.0)]
+    watchdog_ms: Option<f64>,
+}
+
+/// An arm behind topics of ROS 2, such as one of `ros2_control`. It needs no ROS installation, and has not been run on a
+/// robot.
+///
+/// The joints are found by name in the messages of `states`, whatever their order; messages of other joints are skipped.
+/// The commands are trajectories that always end at rest: without another one, the arm is at rest after `horizon_ms` and
+/// the time to slow down, whatever happens to this process, its machine or the network. While the arm is to rest, nothing
+/// is sent. With `message = "velocity"`, velocities are sent, and only `watchdog_ms` on the robot stops it.
+///
+/// The arm is moved only if all of this holds, and the message says what does not: all joints are stated, by one publisher;
+/// somebody reads the commands as the type that is sent; nobody else publishes on their topic; and the clocks agree. When
+/// something changes, the output `safety` is false and the commands ramp to zero, until `resume`.
+///
+/// Commands are reliable, with a depth of 1 and a lifespan: a message is worth nothing when the next one is due. States are
+/// read best effort. The device counts `bad messages` and `commands that were not sent`. It states the facts `urdf`, `tip`
+/// and, if it is given, `home`. `docs/ros2.md` describes the set-up of a robot.
+///
+/// ```toml
+/// [roles]
+/// arm = "velocity_arm"
+///
+/// [commands]
+/// arm.velocity = "joint_limit.velocity"
+///
+/// [bind]
+/// arm = "arm"
+///
+/// [devices.arm]
+/// type = "ros2_arm"
+/// command = "/joint_trajectory_controller/joint_trajectory"
+/// urdf = "builtin:panda.urdf"
+/// tip = "panda_hand"
+/// rate_hz = 250.0
+/// home = [0.0, -0.785, 0.0, -2.356, 0.0, 1.571, 0.785]   # [rad]
+/// ```
+#[derive(Debug, Describe)]
+pub struct Ros2Arm;
+
+impl Device for Ros2Arm {
+    type Params = Params;
+
+    fn open(params: Params) -> Result<Opened, Mistakes> {
+        check_topic("states", &params.states)?;
+        check_topic("command", &params.command)?;
+        let chain = load(&params.urdf, &params.tip, &Mount::NONE)?;
+        params.home.as_ref().map_or(Ok(()), |home| arm::check_posture("home", home, chain.joints()))?;
+        let joints = arm::live_joints(&chain, params.acceleration, params.start.as_deref())?;
+        let names = names(&params, &joints)?;
+        let commanded = commanded(&params, &joints)?;
+        let mut description = Description::every(1.0 / params.rate_hz);
+        let facts = arm::facts(&params.urdf, &params.tip, params.home.as_deref())?;
+        let ports = ArmPorts::fill(description.fills(arm::ROLE), &joints, facts);
+        description.on_silence(OnSilence::Stops, commanded.silence);
+        description.needs_commissioning = true;
+        let driver = ArmDriver {
+            ports,
+            site: params.place.site()?,
+            states: params.states,
+            command: params.command,
+            names,
+            start: StartCheck::new(chain, params.start_bounds, params.start),
+            acceleration: params.acceleration,
+            timeout: Duration::from_secs_f64(params.timeout_ms * 1e-3),
+            commanded,
+        };
+        Ok(Opened { description, driver: Driver::Live(Box::new(driver)) })
+    }
+}
+
+/// Returns the names of the joints on the robot.
+fn names(params: &Params, joints: &JointsShape) -> Result<Vec<String>, Mistakes> {
+    let model = joints.joints.iter().map(|joint| joint.name.clone());
+    let Some(names) = &params.joints else { return Ok(model.collect()) };
+    if names.len() != joints.joints.len() {
+        let model: Vec<String> = model.collect();
+        let message =
+            format!("`joints` has {} names, but the model has the joints `{}`", names.len(), model.join("`, `"));
+        return Err(Mistake::param("joints", message).into());
+    }
+    let twice = names.iter().enumerate().find(|(i, name)| names[..*i].contains(name));
+    twice.map_or(Ok(names.clone()), |(_, name)| {
+        Err(Mistake::param("joints", format!("the joint `{name}` stands twice in `joints`")).into())
+    })
+}
+
+/// Returns how the arm is commanded, and when it rests without a command.
+fn commanded(params: &Params, joints: &JointsShape) -> Result<Commanded, Mistakes> {
+    let fastest = joints.joints.iter().map(|joint| joint.speed).fold(0.0, f64::max);
+    let stop = fastest / params.acceleration + REACTION_S;
+    let horizon = params.horizon_ms * 1e-3;
+    let clock_bound = (params.clock_bound_ms * 1e6) as i64;
+    let whole_ms = |seconds: f64| (seconds * 1e3).ceil() * 1e-3;
+    match (params.message, params.watchdog_ms) {
+        (Kind::Trajectory, None) => {
+            Ok(Commanded { horizon: Some(horizon), lifespan: horizon, clock_bound, silence: whole_ms(horizon + stop) })
+        }
+        (Kind::Velocity, Some(watchdog_ms)) => {
+            let watchdog = watchdog_ms * 1e-3;
+            Ok(Commanded { horizon: None, lifespan: watchdog, clock_bound, silence: whole_ms(watchdog + stop) })
+        }
+        (Kind::Trajectory, Some(_)) => {
+            let message = "a trajectory ends at rest by itself, so it needs no watchdog";
+            Err(Mistake::key("watchdog_ms", message).help("remove `watchdog_ms`").into())
+        }
+        (Kind::Velocity, None) => {
+            let message = "nothing stops an arm that follows velocities when no message comes";
+            let help = "write `watchdog_ms`, the time after which the controller on the robot stops by itself, or \
+                        `message = \"trajectory\"`";
+            Err(Mistake::new(Code::MissingKey, At::Node, message).help(help).into())
+        }
+    }
+}

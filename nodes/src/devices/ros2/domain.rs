@@ -1,0 +1,230 @@
+//! A domain of DDS: the topics that are read and written, and what its other participants offer.
+//!
+//! The names are those that ROS 2 gives to its topics and types on the wire of DDS. There is no node of ROS behind them:
+//! `ros2 topic info -v` lists the endpoints, and `ros2 node list` lists nothing.
+
+use std::net::IpAddr;
+use std::time::Duration;
+
+use futures_util::StreamExt;
+use rustdds::no_key::{DataReaderStream, DataWriter};
+use rustdds::policy::{Durability, History, Lifespan, Reliability};
+use rustdds::qos::QosPolicyId;
+use rustdds::{
+    CDRDeserializerAdapter, CDRSerializerAdapter, DataWriterStatus, DomainParticipant, DomainParticipantBuilder, GUID,
+    Publisher, QosPolicies, QosPolicyBuilder, RTPSEntity, StatusEvented, Subscriber, TopicKind,
+};
+
+use super::message::{Message, dds_type, ros_type};
+
+/// Highest number of a domain whose ports exist on every system.
+pub(super) const MAX_DOMAIN: usize = 101;
+
+/// A participant of a domain.
+pub(super) struct Domain {
+    id: u16,
+    participant: DomainParticipant,
+    publisher: Publisher,
+    subscriber: Subscriber,
+}
+
+/// Somebody else who writes or reads a topic.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(super) struct Peer {
+    pub(super) guid: GUID,
+    /// Name of the type, as ROS writes it.
+    pub(super) kind: String,
+}
+
+/// The messages of a topic.
+pub(super) struct Reader<M: Message>(DataReaderStream<M, CDRDeserializerAdapter<M>>);
+
+/// Writes messages to a topic.
+pub(super) struct Writer<M: Message> {
+    writer: DataWriter<M, CDRSerializerAdapter<M>>,
+    /// Number of readers that get the messages.
+    readers: i32,
+    /// What a reader asks for that is not offered.
+    refused: Option<QosPolicyId>,
+}
+
+/// Returns the domain that is meant: the one of the bench, or that of the environment, or 0.
+pub(super) fn domain_of(given: Option<usize>) -> Result<u16, String> {
+    if let Some(given) = given {
+        return Ok(given as u16);
+    }
+    match std::env::var("ROS_DOMAIN_ID") {
+        Err(_) => Ok(0),
+        Ok(text) if text.is_empty() => Ok(0),
+        Ok(text) => text.parse().ok().filter(|id| usize::from(*id) <= MAX_DOMAIN).ok_or_else(|| {
+            format!(
+                "ROS_DOMAIN_ID is `{text}`, and not a number from 0 to {MAX_DOMAIN}; `domain` of the bench replaces it"
+            )
+        }),
+    }
+}
+
+impl Domain {
+    /// Joins a domain over the network interface with an address.
+    ///
+    /// # Errors
+    /// If the sockets cannot be opened.
+    pub(super) fn join(id: u16, network: IpAddr) -> Result<Self, String> {
+        let failed = |error: &dyn std::fmt::Debug| format!("cannot join the domain {id} over {network}: {error:?}");
+        let participant = DomainParticipantBuilder::new(id).with_only_networks([network]).build();
+        let participant = participant.map_err(|error| failed(&error))?;
+        let qos = QosPolicyBuilder::new().build();
+        let publisher = participant.create_publisher(&qos).map_err(|error| failed(&error))?;
+        let subscriber = participant.create_subscriber(&qos).map_err(|error| failed(&error))?;
+        Ok(Self { id, participant, publisher, subscriber })
+    }
+
+    /// Reads a topic: best effort, which every writer offers, and the newest message only.
+    pub(super) fn read<M: Message>(&self, name: &str) -> Result<Reader<M>, String> {
+        let qos = QosPolicyBuilder::new()
+            .reliability(Reliability::BestEffort)
+            .durability(Durability::Volatile)
+            .history(History::KeepLast { depth: 1 })
+            .build();
+        let topic = self.topic::<M>(name, &qos)?;
+        let reader = self.subscriber.create_datareader_no_key(&topic, None);
+        reader.map(|reader| Reader(reader.async_sample_stream())).map_err(|error| refused(name, &error))
+    }
+
+    /// Writes a topic: reliable, the newest message only, and none that is older than `lifespan`.
+    pub(super) fn write<M: Message>(&self, name: &str, lifespan: Duration) -> Result<Writer<M>, String> {
+        let qos = QosPolicyBuilder::new()
+            .reliability(Reliability::Reliable { max_blocking_time: rustdds::Duration::ZERO })
+            .durability(Durability::Volatile)
+            .history(History::KeepLast { depth: 1 })
+            .lifespan(Lifespan { duration: lifespan.into() })
+            .build();
+        let topic = self.topic::<M>(name, &qos)?;
+        let writer = self.publisher.create_datawriter_no_key(&topic, None);
+        writer.map(|writer| Writer { writer, readers: 0, refused: None }).map_err(|error| refused(name, &error))
+    }
+
+    fn topic<M: Message>(&self, name: &str, qos: &QosPolicies) -> Result<rustdds::Topic, String> {
+        let topic = self.participant.create_topic(dds_name(name), dds_type(M::TYPE), qos, TopicKind::NoKey);
+        topic.map_err(|error| refused(name, &error))
+    }
+
+    /// Returns who else writes a topic.
+    pub(super) fn writers(&self, name: &str) -> Vec<Peer> {
+        let topic = dds_name(name);
+        let found = self.participant.discovered_writers().into_iter().map(|writer| writer.publication_topic_data);
+        let found = found.filter(|data| data.topic_name == topic && self.is_foreign(data.key));
+        found.map(|data| Peer { guid: data.key, kind: ros_type(&data.type_name) }).collect()
+    }
+
+    /// Returns who else reads a topic.
+    pub(super) fn readers(&self, name: &str) -> Vec<Peer> {
+        let topic = dds_name(name);
+        let found = self.participant.discovered_readers().into_iter();
+        let found = found.filter(|reader| *reader.subscription_topic_data.topic_name() == topic);
+        let found = found.map(|reader| Peer {
+            guid: reader.reader_proxy.remote_reader_guid,
+            kind: ros_type(reader.subscription_topic_data.type_name()),
+        });
+        found.filter(|peer| self.is_foreign(peer.guid)).collect()
+    }
+
+    fn is_foreign(&self, guid: GUID) -> bool {
+        guid.prefix != self.participant.guid().prefix
+    }
+
+    /// Says why no message of a topic has come.
+    pub(super) fn why_silent<M: Message>(&self, name: &str) -> String {
+        let writers = self.writers(name);
+        match writers.iter().find(|writer| writer.kind != M::TYPE) {
+            Some(other) if writers.iter().all(|writer| writer.kind != M::TYPE) => {
+                format!("`{name}` has messages of the type {}, and not {}", other.kind, M::TYPE)
+            }
+            _ if !writers.is_empty() => {
+                format!(
+                    "`{name}` is published as {}, but no message arrives: check the publisher and the network",
+                    M::TYPE
+                )
+            }
+            _ => format!("nobody publishes `{name}` {}", self.neighbours()),
+        }
+    }
+
+    /// Says what is heard in the domain.
+    fn neighbours(&self) -> String {
+        let of_ros = |topic: &str| topic.strip_prefix("rt/").map(|name| format!("`/{name}`"));
+        let writers = self.participant.discovered_writers().into_iter().map(|writer| writer.publication_topic_data);
+        let writers = writers.filter(|data| self.is_foreign(data.key));
+        let mut topics: Vec<String> = writers.filter_map(|data| of_ros(&data.topic_name)).collect();
+        topics.sort();
+        topics.dedup();
+        let id = self.id;
+        match topics.as_slice() {
+            [] => format!("in the domain {id}, where no topic of ROS is published: check `domain` and `network`"),
+            few if few.len() <= 6 => format!("in the domain {id}; published there: {}", few.join(", ")),
+            many => {
+                format!("in the domain {id}; published there: {} and {} more", many[..6].join(", "), many.len() - 6)
+            }
+        }
+    }
+}
+
+impl<M: Message> Reader<M> {
+    /// Waits for the next message. Returns it with its writer.
+    ///
+    /// # Errors
+    /// If a message is not of the type that its writer states.
+    pub(super) async fn next(&mut self) -> Result<(M, GUID), String> {
+        match self.0.next().await {
+            Some(Ok(sample)) => {
+                let writer = sample.sample_info().publication_handle();
+                Ok((sample.into_value(), writer))
+            }
+            Some(Err(error)) => Err(format!("a message is no {}: {error}", M::TYPE)),
+            // The stream of a reader has no end.
+            None => std::future::pending().await,
+        }
+    }
+}
+
+impl<M: Message> Writer<M> {
+    /// Sends a message. Returns whether it was taken.
+    pub(super) fn send(&self, message: M) -> bool {
+        self.writer.write(message, None).is_ok()
+    }
+
+    /// Says why nobody gets the messages; `None` if somebody does.
+    pub(super) fn why_unread(&mut self, domain: &Domain, name: &str) -> Option<String> {
+        while let Some(status) = self.writer.try_recv_status() {
+            match status {
+                DataWriterStatus::PublicationMatched { current, .. } => self.readers = current.count(),
+                DataWriterStatus::OfferedIncompatibleQos { last_policy_id, .. } => self.refused = Some(last_policy_id),
+                DataWriterStatus::LivelinessLost { .. } | DataWriterStatus::OfferedDeadlineMissed { .. } => {}
+            }
+        }
+        let (kind, readers) = (M::TYPE, domain.readers(name));
+        let is_read = readers.iter().any(|reader| reader.kind == kind);
+        // The library matches a reader of another type too, which gets nothing.
+        if self.readers > 0 && is_read {
+            return None;
+        }
+        Some(match (readers.first(), self.refused) {
+            (Some(_), Some(policy)) if is_read => format!(
+                "`{name}` is read, but its reader asks for another {policy:?} than commands have: they are reliable and \
+                 volatile, with a depth of 1 and no deadline"
+            ),
+            (Some(_), _) if is_read => format!("the reader of `{name}` has not answered yet"),
+            (Some(other), _) => format!("`{name}` is read as {}, and not as {kind}", other.kind),
+            (None, _) => format!("nobody reads `{name}` {}", domain.neighbours()),
+        })
+    }
+}
+
+/// Returns the name of a topic on the wire of DDS.
+fn dds_name(name: &str) -> String {
+    format!("rt{name}")
+}
+
+fn refused(name: &str, error: &dyn std::fmt::Debug) -> String {
+    format!("the topic `{name}` cannot be used: {error:?}")
+}

@@ -1,0 +1,325 @@
+//! The driver of an arm: it hears joint states, checks what else is on the topics, and sends what the arm is to do.
+
+use std::time::{Duration, Instant};
+
+use async_trait::async_trait;
+use rustdds::GUID;
+use tactflow_runtime::device::{DeviceError, Link, Live};
+use tokio::time::{sleep, sleep_until};
+
+use super::clock::Agreement;
+use super::course::Course;
+use super::domain::Domain;
+use super::message::JointState;
+use super::output::{Commanded, Output, wall_clock};
+use super::place::Site;
+use crate::devices::arm::ArmPorts;
+use crate::devices::start::{StartCheck, StartReport};
+
+/// Time between two looks at who else is on the topics.
+const LOOK: Duration = Duration::from_millis(100);
+/// Longest time at the end of a run in which the arm comes to rest.
+const MAX_REST: Duration = Duration::from_secs(2);
+/// How long a second publisher of the joints is remembered.
+const MEMORY: Duration = Duration::from_secs(1);
+
+/// An arm that is described and ready to run.
+pub(super) struct ArmDriver {
+    pub(super) ports: ArmPorts,
+    pub(super) site: Site,
+    pub(super) states: String,
+    pub(super) command: String,
+    pub(super) names: Vec<String>,
+    pub(super) start: StartCheck,
+    pub(super) acceleration: f64,
+    pub(super) timeout: Duration,
+    pub(super) commanded: Commanded,
+}
+
+#[async_trait]
+impl Live for ArmDriver {
+    async fn run(self: Box<Self>, mut link: Link) -> Result<(), DeviceError> {
+        let domain = self.site.join().map_err(DeviceError)?;
+        let mut states = domain.read::<JointState>(&self.states).map_err(DeviceError)?;
+        let output = Output::open(&domain, &self.command, &self.commanded).map_err(DeviceError)?;
+        let mut session = Session::new(*self, domain, output);
+        let stopped = link.stopped();
+        tokio::pin!(stopped);
+        let mut ending: Option<Instant> = None;
+        loop {
+            tokio::select! {
+                biased;
+                () = &mut stopped, if ending.is_none() => ending = Some(Instant::now()),
+                message = states.next() => {
+                    session.hear(&mut link, message);
+                    continue;
+                }
+                () = link.commanded() => {}
+                () = sleep_until((session.looked + LOOK).into()) => session.look(),
+            }
+            session.judge(&mut link);
+            session.send(&mut link);
+            if ending.is_some_and(|since| session.course.rests() || since.elapsed() > MAX_REST) {
+                session.leave(&link).await;
+                return Ok(());
+            }
+        }
+    }
+}
+
+/// What the arm may do.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Phase {
+    /// It may move when everything holds.
+    Waiting { since: Instant },
+    /// It follows the commands of an epoch.
+    Ready { epoch: u64 },
+    /// It may not move until the operator resumes.
+    Refused,
+}
+
+struct Session {
+    arm: ArmDriver,
+    domain: Domain,
+    output: Output,
+    course: Course,
+    phase: Phase,
+    begin: Instant,
+    agreement: Agreement,
+    /// The newest posture [rad].
+    position: Vec<f64>,
+    /// When it came, and who wrote it.
+    heard: Option<(Instant, GUID)>,
+    /// When somebody else wrote the same joints.
+    second: Option<Instant>,
+    /// Why the last message was not used.
+    bad: Option<String>,
+    is_lost: bool,
+    number: u64,
+    /// What is wrong on the topics, as of the last look.
+    topics: Option<String>,
+    looked: Instant,
+    sent: Instant,
+    /// Whether no command has moved the arm in this run.
+    is_first: bool,
+    /// Whether the last message that was sent ends a motion.
+    has_ended: bool,
+    /// Whether the arm has stopped by itself since the last joint state.
+    has_stopped: bool,
+}
+
+impl Session {
+    fn new(arm: ArmDriver, domain: Domain, output: Output) -> Self {
+        let now = Instant::now();
+        let joints = arm.names.len();
+        Self {
+            course: Course::new(joints, arm.acceleration),
+            agreement: Agreement::new(arm.commanded.clock_bound, now),
+            phase: Phase::Waiting { since: now },
+            begin: now,
+            position: vec![0.0; joints],
+            heard: None,
+            second: None,
+            bad: None,
+            is_lost: false,
+            number: 0,
+            topics: Some("nobody has looked at the topics yet".to_owned()),
+            looked: now,
+            sent: now,
+            is_first: true,
+            has_ended: true,
+            has_stopped: false,
+            arm,
+            domain,
+            output,
+        }
+    }
+
+    /// Takes a message of joint states.
+    fn hear(&mut self, link: &mut Link, message: Result<(JointState, GUID), String>) {
+        let taken = message.and_then(|(message, writer)| self.take(&message).map(|is_ours| (message, writer, is_ours)));
+        match taken {
+            Ok((message, writer, true)) => self.publish(link, &message, writer),
+            // Those of other joints, such as a gripper's.
+            Ok((_, _, false)) => {}
+            Err(why) => {
+                link.count("bad messages");
+                self.bad = Some(why);
+            }
+        }
+    }
+
+    /// Takes the positions of our joints out of a message. Returns whether it has any.
+    fn take(&mut self, message: &JointState) -> Result<bool, String> {
+        let (states, names) = (&self.arm.states, &message.name);
+        if names.len() != message.position.len() {
+            return Err(format!("`{states}` has {} names and {} positions", names.len(), message.position.len()));
+        }
+        let missing = |name: &&String| !names.contains(name);
+        if self.arm.names.iter().all(|name| missing(&name)) {
+            self.bad = Some(format!("`{states}` has the joints `{}`, and none of ours", names.join("`, `")));
+            return Ok(false);
+        }
+        if let Some(name) = self.arm.names.iter().find(missing) {
+            return Err(format!("`{states}` lacks the joint `{name}`; it has `{}`", names.join("`, `")));
+        }
+        for (name, position) in names.iter().zip(&message.position) {
+            if let Some(i) = self.arm.names.iter().position(|ours| ours == name) {
+                self.position[i] = *position;
+            }
+        }
+        Ok(true)
+    }
+
+    fn publish(&mut self, link: &mut Link, message: &JointState, writer: GUID) {
+        let now = Instant::now();
+        if self.heard.is_some_and(|(at, last)| last != writer && now - at < self.arm.timeout) {
+            self.second = Some(now);
+        }
+        let stamp = message.header.stamp.nanos();
+        if stamp != 0 {
+            self.agreement.hear(now, wall_clock(), stamp);
+        }
+        if self.heard.is_none() || self.is_lost || self.has_stopped {
+            self.follow_measured(f64::EPSILON);
+            self.has_stopped = false;
+        }
+        self.heard = Some((now, writer));
+        (self.is_lost, self.bad, self.number) = (false, None, self.number + 1);
+        let is_ready = matches!(self.phase, Phase::Ready { .. });
+        // A graph that is held because the arm is not ready yet would wait for the operator.
+        if !is_ready && self.begin.elapsed() < self.arm.site.patience {
+            return;
+        }
+        let stamp = if stamp == 0 { link.arrival() } else { link.stamp_of(stamp) };
+        let equilibrium = if self.output.ends_at_rest() { &self.course.reference } else { &self.position };
+        let (ports, number) = (self.arm.ports, self.number);
+        link.publish(|samples| {
+            ports.write_with_safety(samples, stamp, number, [&self.position, equilibrium], is_ready);
+        });
+    }
+
+    /// Takes the measured posture as the commanded one, if a joint is farther away than `bound` [rad].
+    fn follow_measured(&mut self, bound: f64) {
+        let far = self.course.reference.iter().zip(&self.position).any(|(reference, q)| (reference - q).abs() > bound);
+        if far {
+            self.course.reference.copy_from_slice(&self.position);
+        }
+    }
+
+    /// Looks who else is on the topics.
+    fn look(&mut self) {
+        self.looked = Instant::now();
+        self.topics = self.output.trouble(&self.domain, &self.arm.command);
+    }
+
+    /// Returns why the arm may not move.
+    fn why_not(&self) -> Option<String> {
+        let states = &self.arm.states;
+        let Some((at, _)) = self.heard.filter(|(at, _)| at.elapsed() <= self.arm.timeout) else {
+            return Some(self.bad.clone().unwrap_or_else(|| self.domain.why_silent::<JointState>(states)));
+        };
+        if self.second.is_some_and(|second| at.saturating_duration_since(second) < MEMORY) {
+            return Some(format!("two programs publish our joints on `{states}`"));
+        }
+        if self.output.ends_at_rest()
+            && let Some(why) = self.agreement.why_not(states)
+        {
+            return Some(why);
+        }
+        self.topics.clone()
+    }
+
+    /// Decides whether the arm may move.
+    fn judge(&mut self, link: &mut Link) {
+        let why = self.why_not();
+        let is_silent = self.heard.is_none_or(|(at, _)| at.elapsed() > self.arm.timeout);
+        let has_waited = self.heard.is_some() || self.begin.elapsed() > self.arm.site.patience;
+        if is_silent && has_waited && !self.is_lost {
+            self.is_lost = true;
+            let why = why.clone().unwrap_or_default();
+            self.arm.ports.lose(link, &why);
+        }
+        let epoch = link.epoch();
+        self.phase = match (self.phase, why) {
+            (Phase::Waiting { .. }, None) => match self.check() {
+                Ok(()) => Phase::Ready { epoch },
+                Err(why) => refused(link, why),
+            },
+            (Phase::Waiting { since }, Some(why)) if since.elapsed() > self.arm.site.patience => refused(link, why),
+            (Phase::Ready { epoch: last }, None) if last != epoch => Phase::Waiting { since: Instant::now() },
+            (Phase::Ready { .. }, Some(_)) if is_silent => Phase::Waiting { since: Instant::now() },
+            (Phase::Ready { .. }, Some(why)) => refused(link, why),
+            (Phase::Refused, _) if !link.refuses() => Phase::Waiting { since: Instant::now() },
+            (phase, _) => phase,
+        };
+    }
+
+    /// Compares the posture with where the arm should be before it is moved.
+    fn check(&mut self) -> Result<(), String> {
+        if !self.course.rests() {
+            return Ok(());
+        }
+        self.follow_measured(self.arm.start.deflection());
+        let report = StartReport {
+            measured: &self.position,
+            commanded: &self.course.reference,
+            target: &self.course.reference,
+            held: None,
+            tip: None,
+            is_first: self.is_first,
+        };
+        self.arm.start.check(&report).map_err(|error| error.0)
+    }
+
+    /// Sends what holds now.
+    fn send(&mut self, link: &mut Link) {
+        // The lease must be asked in every cycle, also when nothing is sent.
+        let commands = link.commands().joints(self.arm.ports.velocity).to_vec();
+        let dt = self.sent.elapsed().as_secs_f64();
+        self.sent = Instant::now();
+        // Without a message for so long, the arm has stopped by itself, and is not where the commands were going.
+        let has_stopped = dt > self.arm.commanded.lifespan && !self.course.rests();
+        if link.is_mute() || has_stopped {
+            self.course.halt();
+            (self.has_ended, self.has_stopped) = (true, true);
+            self.phase = Phase::Waiting { since: Instant::now() };
+        }
+        if link.is_mute() || self.has_stopped {
+            return;
+        }
+        // The operator may have resumed since it was judged. Then these commands are new, and nothing is checked yet.
+        let is_checked = self.phase == Phase::Ready { epoch: link.epoch() };
+        if self.heard.is_none() {
+            return;
+        }
+        self.course.advance(is_checked.then_some(commands.as_slice()), dt);
+        let rests = self.course.rests();
+        self.is_first &= rests;
+        // At rest, an arm that follows trajectories needs no more; one that follows velocities is told so.
+        let is_due = !(rests && self.has_ended) || is_checked && !self.output.ends_at_rest();
+        if is_due {
+            self.has_ended = rests;
+            if !self.output.say(&self.course, &self.arm.names) {
+                link.count("commands that were not sent");
+            }
+        }
+    }
+
+    /// Repeats at the end of a run that the arm is to rest, in case a message was lost.
+    async fn leave(&mut self, link: &Link) {
+        self.course.halt();
+        for _ in 0..3 {
+            if link.is_mute() || self.is_first {
+                return;
+            }
+            self.output.say(&self.course, &self.arm.names);
+            sleep(Duration::from_millis(10)).await;
+        }
+    }
+}
+
+fn refused(link: &mut Link, why: String) -> Phase {
+    link.refuse(why);
+    Phase::Refused
+}

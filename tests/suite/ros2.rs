@@ -1,0 +1,318 @@
+//! Devices over ROS 2 against CycloneDDS in another process, `tests/peers/ros2/robot.py`: docs/ros2.md.
+
+use std::fs;
+use std::process::{Child, Command, Stdio};
+use std::thread::sleep;
+use std::time::{Duration, Instant};
+
+use serde_json::{Value, json};
+use tactflow_tests::workspace;
+use tempfile::TempDir;
+
+use crate::cli::in_new_folder;
+use crate::control_law::rows;
+use crate::peer::{Process, SOON};
+use crate::record::has_python_module;
+use crate::tool::{said, tool};
+
+/// Time within which the arm rests by itself [s]: the horizon of 40 ms, the stop from the speeds of these tests, which are
+/// below 0.5 rad/s, at 10 rad/s², the lag of the arm, and what a busy machine adds.
+const REST: f64 = 0.04 + 0.05 + 0.1 + 0.15;
+/// What is no motion [rad/s].
+const STILL: f64 = 1e-3;
+
+/// A robot in another process, in a domain of its own.
+struct Robot {
+    process: Process,
+    domain: u32,
+}
+
+impl Robot {
+    /// Starts it; `None` without CycloneDDS.
+    fn start(domain: u32, settings: Value) -> Option<Self> {
+        if !has_python_module("cyclonedds") {
+            return None;
+        }
+        let mut all = json!({ "domain": domain, "urdf": workspace().join("graphs/robots/lwr4p.urdf") });
+        all.as_object_mut().unwrap().extend(settings.as_object().unwrap().clone());
+        let process = Process::start("ros2/robot.py", [all.to_string().as_str()]);
+        process.wait(0, |event| event["t"].is_f64());
+        Some(Self { process, domain })
+    }
+
+    /// Writes a bench with this robot. `change` replaces lines of it.
+    fn bench(&self, change: &[(&str, &str)]) -> (TempDir, String) {
+        let (folder, path) = in_new_folder("bench.toml");
+        let text = fs::read_to_string(workspace().join("tests/data/ros2_bench.toml")).unwrap();
+        let text = text.replace("../../graphs", &workspace().join("graphs").display().to_string());
+        let mut text = text.replace("domain = 17", &format!("domain = {}\nconnect_s = 2.0", self.domain));
+        for (from, to) in change {
+            assert!(text.contains(from), "{from}");
+            text = text.replace(from, to);
+        }
+        fs::write(&path, text).unwrap();
+        (folder, path)
+    }
+
+    fn tell(&mut self, word: &str) {
+        let from = self.process.count();
+        self.process.say(word);
+        self.process.wait(from, |event| event["told"] == word);
+    }
+
+    /// The largest speed of a joint from a moment on [s, wall clock], [rad/s].
+    fn speed(&self, from: f64) -> f64 {
+        let lines = self.process.said(0);
+        let later = lines.iter().filter(|line| line["t"].as_f64().is_some_and(|t| t > from));
+        later.map(|line| line["speed"].as_f64().unwrap()).fold(0.0, f64::max)
+    }
+
+    /// The time of the newest line [s, wall clock].
+    fn now(&self) -> f64 {
+        self.process.said(0).iter().rev().find_map(|line| line["t"].as_f64()).unwrap()
+    }
+
+    /// The newest number of something.
+    fn count(&self, what: &str) -> u64 {
+        self.process.said(0).iter().rev().find_map(|line| line[what].as_u64()).unwrap()
+    }
+
+    /// Waits until the arm moves.
+    fn moves(&self) {
+        self.process.wait(self.process.count(), |event| event["speed"].as_f64().is_some_and(|speed| speed > 0.01));
+    }
+}
+
+fn signal(id: u32, name: &str) {
+    let kill = Command::new("kill").args([&format!("-{name}"), &id.to_string()]).status().unwrap();
+    assert!(kill.success());
+}
+
+/// Starts the hybrid task on a bench.
+fn run(bench: &str) -> Child {
+    let mut run = tool(&["run", "graphs/hybrid.toml", "--bench", bench, "--slow", "1", "--quiet", "--for", "20s"]);
+    run.stdin(Stdio::null()).stdout(Stdio::null()).stderr(Stdio::piped()).spawn().unwrap()
+}
+
+/// Waits for the end of a run, and returns what it said.
+fn end(child: Child) -> String {
+    let output = child.wait_with_output().unwrap();
+    String::from_utf8(output.stderr).unwrap()
+}
+
+/// Mean and standard deviation.
+fn spread(values: &[f64]) -> (f64, f64) {
+    let mean = values.iter().sum::<f64>() / values.len() as f64;
+    let squares = values.iter().map(|value| (value - mean).powi(2)).sum::<f64>();
+    (mean, (squares / values.len() as f64).sqrt())
+}
+
+#[test]
+fn the_hybrid_task_holds_the_contact_over_ros_2() {
+    // The joints stand in another order than in the model, and a gripper is among them.
+    let names = json!([
+        "gripper",
+        "lwr_a6_joint",
+        "lwr_a5_joint",
+        "lwr_a4_joint",
+        "lwr_a3_joint",
+        "lwr_a2_joint",
+        "lwr_a1_joint",
+        "lwr_e1_joint"
+    ]);
+    let Some(robot) = Robot::start(31, json!({ "names": names })) else { return };
+    let (folder, bench) = robot.bench(&[]);
+    let out = folder.path().join("run.csv");
+    let recording = folder.path().join("run.mcap");
+    let [out, recording] = [&out, &recording].map(|path| path.to_str().unwrap());
+    let args = ["run", "graphs/hybrid.toml", "--bench", &bench, "--slow", "1", "--quiet", "--for", "9s", "--out", out];
+    let ran = said(&mut tool(&[&args[..], &["--record", recording]].concat()));
+    assert_eq!(ran.code, 0, "{}", ran.err);
+    let late: Vec<_> = rows(out).into_iter().filter(|row| row["time"] > 6.0).collect();
+    let column = |name: &str| late.iter().filter_map(|row| row.get(name).copied()).collect::<Vec<f64>>();
+    for (name, bound) in [("error.error.x", 0.2e-3), ("error.error.y", 0.2e-3), ("error.error.pressure", 0.01)] {
+        let (mean, deviation) = spread(&column(name));
+        assert!(mean.abs() < bound && deviation < bound, "{name}: {mean} ± {deviation}");
+    }
+    let ages = robot.process.said(0).into_iter().flat_map(|line| {
+        let ages = line["ages"].as_array().cloned().unwrap_or_default();
+        ages.into_iter().map(|age| age.as_f64().unwrap()).collect::<Vec<f64>>()
+    });
+    let mut ages: Vec<f64> = ages.collect();
+    ages.sort_by(f64::total_cmp);
+    assert!(ages.len() > 500 && robot.count("refused") == 0, "{} commands", ages.len());
+    let [half, most] = [0.5, 0.99].map(|part| ages[(part * ages.len() as f64) as usize] * 1e3);
+    println!("{} commands: {half:.2} ms old at the median, {most:.2} ms at 99 %", ages.len());
+    assert!(half < 10.0 && most < 40.0, "{half} ms, {most} ms");
+    // A replay needs neither the robot nor a domain.
+    let replayed = said(&mut tool(&["replay", "--quiet", recording]));
+    assert_eq!(replayed.code, 0, "{}", replayed.err);
+}
+
+#[test]
+fn arrays_and_tactile_states_are_pads_too() {
+    for (domain, pad, message) in [(32, "array", "array"), (33, "tactile_state", "tactile_state\"\nchannel = \"palm")] {
+        let Some(robot) = Robot::start(domain, json!({ "pad": pad })) else { return };
+        let (_folder, bench) = robot.bench(&[("message = \"image", &format!("message = \"{message}"))]);
+        let args = ["run", "graphs/hybrid.toml", "--bench", &bench, "--slow", "1", "--quiet", "--for", "5s"];
+        let ran = said(&mut tool(&args));
+        assert_eq!(ran.code, 0, "{pad}: {}", ran.err);
+        let force = robot.process.said(0).iter().rev().find_map(|line| line["force"].as_f64()).unwrap();
+        assert!(force > 1.0, "{pad}: {force} N");
+    }
+}
+
+#[test]
+fn velocities_move_an_arm_that_has_a_watchdog() {
+    let Some(robot) = Robot::start(34, json!({ "command": "velocity" })) else { return };
+    let change = ("command = \"/command\"", "command = \"/command\"\nmessage = \"velocity\"\nwatchdog_ms = 100.0");
+    let (_folder, bench) = robot.bench(&[change]);
+    let mut child = run(&bench);
+    robot.moves();
+    signal(child.id(), "KILL");
+    let killed = robot.now();
+    let _ = child.wait();
+    sleep(Duration::from_secs(1));
+    assert!(robot.speed(killed + 0.1 + REST) < STILL, "{} rad/s", robot.speed(killed + 0.1 + REST));
+}
+
+#[test]
+fn whatever_happens_to_the_process_the_arm_comes_to_rest() {
+    let Some(robot) = Robot::start(35, json!({})) else { return };
+    let (_folder, bench) = robot.bench(&[]);
+    for name in ["KILL", "STOP"] {
+        let mut child = run(&bench);
+        robot.moves();
+        signal(child.id(), name);
+        let from = robot.now();
+        sleep(Duration::from_secs(1));
+        let speed = robot.speed(from + REST);
+        assert!(speed < STILL, "{name}: {speed} rad/s");
+        if name == "STOP" {
+            // It goes on, and nothing moves: the commands of its epoch are refused.
+            let from = robot.now();
+            signal(child.id(), "CONT");
+            let text = end(child);
+            assert!(text.contains("lost"), "{text}");
+            assert!(robot.speed(from) < STILL, "{} rad/s after it goes on", robot.speed(from));
+        } else {
+            let _ = child.wait();
+        }
+    }
+}
+
+#[test]
+fn a_robot_that_hangs_and_comes_back_gets_no_old_command() {
+    let Some(robot) = Robot::start(36, json!({})) else { return };
+    let (_folder, bench) = robot.bench(&[]);
+    let child = run(&bench);
+    robot.moves();
+    signal(robot.process.id(), "STOP");
+    sleep(Duration::from_millis(1500));
+    let lines = robot.process.count();
+    signal(robot.process.id(), "CONT");
+    let text = end(child);
+    assert!(text.contains("is lost"), "{text}");
+    sleep(Duration::from_millis(500));
+    // The first line has the speed from before the hang.
+    let later = robot.process.said(lines + 1);
+    let fastest = later.iter().filter_map(|line| line["speed"].as_f64()).fold(0.0, f64::max);
+    assert!(later.len() > 10 && fastest < STILL, "{fastest} rad/s after it came back");
+}
+
+/// What is wrong, and what the run says.
+fn assert_says(domain: u32, settings: Value, word: Option<&str>, expected: &str) {
+    let Some(mut robot) = Robot::start(domain, settings.clone()) else { return };
+    let (_folder, bench) = robot.bench(&[]);
+    let child = run(&bench);
+    if let Some(word) = word {
+        robot.moves();
+        robot.tell(word);
+    }
+    let begin = Instant::now();
+    let text = end(child);
+    assert!(text.contains(expected), "{settings} {word:?}: {text}");
+    assert!(begin.elapsed() < SOON, "{settings} {word:?}: it takes {:?}", begin.elapsed());
+    let from = robot.now();
+    sleep(Duration::from_millis(300));
+    assert!(robot.speed(from) < STILL, "{settings} {word:?}: the arm moves");
+}
+
+#[test]
+fn what_is_wrong_on_the_topics_is_named() {
+    let of_others = "has the joints `finger`, and none of ours";
+    let cases = [
+        (
+            json!({ "state_type": "String" }),
+            "is lost: `/joint_states` has messages of the type std_msgs/msg/String, and not",
+        ),
+        (
+            json!({ "names": ["lwr_a1_joint", "lwr_a2_joint"] }),
+            "lacks the joint `lwr_e1_joint`; it has `lwr_a1_joint`, ",
+        ),
+        (json!({ "names": ["finger"] }), of_others),
+        (json!({ "nan_at": 0.0 }), "the controller reports no number as the position of joint"),
+        (json!({ "stamp_offset": -1.7e9 }), "are years away from the clock of this machine"),
+        (json!({ "stamp_offset": -0.5 }), "behind the clock of this machine, and at most 20 ms"),
+        (json!({ "stamp_offset": 0.5 }), "ahead of the clock of this machine, and at most 20 ms"),
+        (json!({ "command": null }), "nobody reads `/command` in the domain "),
+        (
+            json!({ "reader_type": "Float64MultiArray" }),
+            "`/command` is read as std_msgs/msg/Float64MultiArray, and not as",
+        ),
+        (json!({ "reader_durability": "transient_local" }), "asks for another Durability than commands have"),
+        (json!({ "rows": 8 }), "`pad.image` is lost: `/tactile`: an image of 8x8 pixels, and not 16x16"),
+        (json!({ "pad": null }), "`pad.image` is lost: nobody publishes `/tactile` in the domain "),
+    ];
+    for (i, (settings, expected)) in cases.into_iter().enumerate() {
+        assert_says(40 + i as u32, settings, None, expected);
+    }
+}
+
+#[test]
+fn what_goes_wrong_while_the_arm_moves_stops_it() {
+    let cases = [
+        ("second", "somebody else publishes on `/command` too"),
+        ("twin", "two programs publish our joints on `/joint_states`"),
+        ("quiet", "is lost: `/joint_states` is published as sensor_msgs/msg/JointState, but no message arrives"),
+        ("blind", "`pad.image` is lost: `/tactile` is published as sensor_msgs/msg/Image, but no message arrives"),
+    ];
+    for (i, (word, expected)) in cases.into_iter().enumerate() {
+        assert_says(60 + i as u32, json!({}), Some(word), expected);
+    }
+}
+
+#[test]
+fn a_bench_that_cannot_be_right_is_refused_without_a_domain() {
+    for (from, to, expected) in [
+        ("topic = \"/tactile\"", "topic = \"tactile\"", "`tactile` is no name of a topic"),
+        (
+            "message = \"image\"",
+            "message = \"image\"\nchannel = \"palm\"",
+            "`channel` is the sensor of a `tactile_state`",
+        ),
+        (
+            "command = \"/command\"",
+            "command = \"/command\"\nmessage = \"velocity\"",
+            "write `watchdog_ms`, the time after",
+        ),
+        ("command = \"/command\"", "command = \"/command\"\nwatchdog_ms = 5", "needs no watchdog"),
+        (
+            "command = \"/command\"",
+            "command = \"/command\"\njoints = [\"a\"]",
+            "`joints` has 1 names, but the model has",
+        ),
+        ("command = \"/command\"", "command = \"/command\"\nnetwork = \"wlan0\"", "`wlan0` is no IP address"),
+        ("command = \"/command\"", "command = \"/command\"\ndomain = 300", "101"),
+    ] {
+        let (_folder, path) = in_new_folder("bench.toml");
+        let text = fs::read_to_string(workspace().join("tests/data/ros2_bench.toml")).unwrap();
+        let text = text.replace("../../graphs", &workspace().join("graphs").display().to_string());
+        let text = text.replace("domain = 17\n", "");
+        assert!(text.contains(from), "{from}");
+        fs::write(&path, text.replace(from, to)).unwrap();
+        let checked = said(&mut tool(&["check", "graphs/hybrid.toml", "--bench", &path]));
+        let text = checked.out + &checked.err;
+        assert!(checked.code != 0 && text.contains(expected), "{to}: {text}");
+    }
+}
