@@ -1,6 +1,7 @@
 //! Devices over ROS 2 against CycloneDDS in another process, `tests/peers/ros2/robot.py`: docs/ros2.md.
 
 use std::fs;
+use std::io::Write;
 use std::process::{Child, Command, Stdio};
 use std::thread::sleep;
 use std::time::{Duration, Instant};
@@ -142,7 +143,8 @@ fn the_hybrid_task_holds_the_contact_over_ros_2() {
     ages.sort_by(f64::total_cmp);
     assert!(ages.len() > 500 && robot.count("refused") == 0, "{} commands", ages.len());
     let [half, most] = [0.5, 0.99].map(|part| ages[(part * ages.len() as f64) as usize] * 1e3);
-    println!("{} commands: {half:.2} ms old at the median, {most:.2} ms at 99 %", ages.len());
+    let _ =
+        writeln!(std::io::stderr(), "{} commands: {half:.2} ms old at the median, {most:.2} ms at 99 %", ages.len());
     assert!(half < 10.0 && most < 40.0, "{half} ms, {most} ms");
     // A replay needs neither the robot nor a domain.
     let replayed = said(&mut tool(&["replay", "--quiet", recording]));
@@ -315,4 +317,14 @@ fn a_bench_that_cannot_be_right_is_refused_without_a_domain() {
         let text = checked.out + &checked.err;
         assert!(checked.code != 0 && text.contains(expected), "{to}: {text}");
     }
+}
+
+#[test]
+fn the_bench_of_the_page_is_accepted() {
+    let page = fs::read_to_string(workspace().join("docs/ros2.md")).unwrap();
+    let block = page.split("   ```toml\n").nth(1).unwrap().split("   ```\n").next().unwrap();
+    let (_folder, path) = in_new_folder("bench.toml");
+    fs::write(&path, block).unwrap();
+    let checked = said(&mut tool(&["check", "graphs/force.toml", "--bench", &path]));
+    assert_eq!((checked.code, checked.err.as_str()), (0, ""), "{}", checked.out);
 }
