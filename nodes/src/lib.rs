@@ -81,6 +81,11 @@ fn edge() -> Catalogue {
         .device::<devices::ros2::Ros2Pad>()
         .device::<devices::ros2::Ros2Force>()
         .device::<devices::ros2::Ros2Arm>();
+    #[cfg(not(feature = "ros2"))]
+    let catalogue = catalogue.left_out(
+        &["ros2_pad", "ros2_force", "ros2_arm"],
+        "build the tool with ROS 2: `cargo install --path nodes --features ros2` (docs/ros2.md)",
+    );
     #[cfg(feature = "process")]
     let catalogue = catalogue.device::<devices::process::Process>();
     #[cfg(feature = "cli")]

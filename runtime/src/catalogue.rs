@@ -30,6 +30,8 @@ pub struct Catalogue {
     /// Titles of groups, each with the number of its first node.
     groups: Vec<(usize, &'static str)>,
     devices: Vec<Box<dyn DeviceType>>,
+    /// Device types that this build leaves out, each with how to get it.
+    left_out: Vec<(&'static str, &'static str)>,
     roles: Vec<RoleType>,
     files: Vec<BuiltinFile>,
     lints: Vec<Lint>,
@@ -130,6 +132,12 @@ impl Catalogue {
         self
     }
 
+    /// States device types that this build leaves out: `how` says how to get them. A graph that uses one is told so.
+    pub fn left_out(mut self, names: &[&'static str], how: &'static str) -> Self {
+        self.left_out.extend(names.iter().map(|name| (*name, how)));
+        self
+    }
+
     /// Adds all entries of another catalogue.
     ///
     /// # Panics
@@ -150,6 +158,7 @@ impl Catalogue {
         for role in other.roles {
             self = self.role(role);
         }
+        self.left_out.extend(other.left_out);
         self.files.extend(other.files);
         self.lints.extend(other.lints);
         self
@@ -176,6 +185,12 @@ impl Catalogue {
     #[must_use]
     pub fn find_device(&self, name: &str) -> Option<&dyn DeviceType> {
         self.devices.iter().find(|device| device.name() == name).map(|device| &**device)
+    }
+
+    /// Returns how to get a device type that this build leaves out.
+    #[must_use]
+    pub fn how_to_get(&self, device: &str) -> Option<&'static str> {
+        self.left_out.iter().find(|(name, _)| *name == device).map(|(_, how)| *how)
     }
 
     /// Returns a type of role by its name.

@@ -3,7 +3,7 @@
 
 use std::collections::BTreeSet;
 
-use tactflow_runtime::engine::{Changer, Engine};
+use tactflow_runtime::engine::{Changer, End, Engine, RunOptions, ScheduledChanges, run_changing};
 use tactflow_runtime::graph::{Request, compile};
 use tactflow_runtime::random::Random;
 use tactflow_runtime::signal::Features;
@@ -111,6 +111,26 @@ fn random_changes_in_contact_jump_nowhere_and_touch_no_other_limit() {
     assert!(sent >= 50 && engine.value_changes().len() > 40, "{sent} sent");
     assert!(acted.is_subset(&allowed), "{acted:?} act, and without changes {allowed:?}");
     assert!(engine.halts().is_empty());
+}
+
+#[test]
+fn a_change_that_the_end_of_the_run_cuts_is_a_warning() {
+    let run = say(&["run", "graphs/hybrid.toml", "--for", "2s", "--quiet", "--change", "1.9s:pid.gains.y.kp=1"]);
+    assert_eq!(run.code, 0, "{}", run.err);
+    let line = run.err.lines().find(|line| line.contains("`pid.gains.y.kp` was ")).unwrap_or_default();
+    assert!(line.ends_with("at the end, on its way to 1"), "{}", run.err);
+}
+
+#[test]
+fn a_check_of_a_change_that_panics_ends_the_changes_and_not_the_run() {
+    let request = hybrid();
+    let mut engine = engine(&request);
+    let changer = Changer::new(&mut engine, &request, |_| panic!("a lint with a fault")).unwrap();
+    let mut changes = ScheduledChanges::new(changer, &[(0.1, KP.to_owned(), 2.0)]).unwrap();
+    let options = RunOptions { duration: Some(0.4), is_realtime: true, ..RunOptions::default() };
+    let outcome = run_changing(&mut engine, &options, &mut changes, &mut |_| ()).unwrap();
+    assert!(outcome.end == End::Duration && outcome.ticks > 50, "{:?} after {} ticks", outcome.end, outcome.ticks);
+    assert_eq!(value(&engine, KP), [3.5, 3.5]);
 }
 
 #[test]

@@ -449,3 +449,12 @@ fn what_a_device_counts_is_in_the_summary_of_the_run() {
     let counts: Vec<_> = engine.counts().map(|(device, counts)| (device.to_owned(), counts.to_vec())).collect();
     assert_eq!(counts, [("ruler".to_owned(), vec![("frames", 3), ("bad frames", 1)])]);
 }
+
+#[cfg(not(feature = "ros2"))]
+#[test]
+fn a_device_that_the_build_leaves_out_is_no_misspelling() {
+    let checked = crate::tool::say(&["check", "graphs/hybrid.toml", "--bench", "tests/data/ros2_bench.toml"]);
+    let text = checked.out + &checked.err;
+    assert!(text.contains("this build leaves out the device type `ros2_arm`"), "{text}");
+    assert!(text.contains("cargo install --path nodes --features ros2") && !text.contains("did you mean"), "{text}");
+}

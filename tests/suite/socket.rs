@@ -211,7 +211,7 @@ fn garbage_is_refused_and_delays_nobody() {
         (r#"{"ask":"set","values":{}}"#, "name a parameter and its value"),
         (r#"{"ask":"set","values":{"pid.gains.y.kp":"2"}}"#, "this line is no request"),
         (r#"{"ask":"set","values":{"pid.gains.y.kp":1e999}}"#, "this line is no request"),
-        (r#"{"ask":"get","pattern":"********"}"#, "a pattern has at most 4 `*`"),
+        (r#"{"ask":"get","pattern":"*q*q*q*q*q*q*q*q"}"#, "is called `*q*q*q"),
         (r#"{"ask":"send","word":"resume"}"#, "can start a motion"),
     ];
     let mut client = session.connect(pid);
@@ -246,6 +246,23 @@ fn garbage_is_refused_and_delays_nobody() {
     wait_for(|| (session.say(&["get", KP]).code == 0).then_some(()), "place for a client");
     let end = session.end();
     assert!(!end.out.contains("changed from") && !end.out.contains("stopped"), "{}", end.out);
+}
+
+#[test]
+fn a_stop_needs_no_place() {
+    let mut session = Session::new();
+    let pid = session.run(&["graphs/hybrid.toml"]);
+    let mut idle = Vec::new();
+    let is_full = || {
+        idle.extend((0..20).map(|_| UnixStream::connect(session.socket(pid)).unwrap()));
+        (session.say(&["get", KP]).code != 0).then_some(())
+    };
+    wait_for(is_full, "refusal");
+    // Those without a place are told so, and gone, after a moment.
+    let stopped = wait_for(|| Some(session.say(&["send", "stop"])).filter(|said| said.code == 0), "place for a stop");
+    assert!(stopped.out.contains("stop"), "{}", stopped.out);
+    let end = finish(session.runs.remove(0));
+    assert!(end.code == 1 && end.err.contains("stop"), "{}", end.err);
 }
 
 #[test]

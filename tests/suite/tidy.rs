@@ -151,6 +151,9 @@ fn only_the_edge_names_tokio() {
         "nodes/src/devices/process/pad.rs",
         "nodes/src/devices/process/session.rs",
         "nodes/src/devices/process/stepped.rs",
+        "nodes/src/devices/ros2/driver.rs",
+        "nodes/src/devices/ros2/force.rs",
+        "nodes/src/devices/ros2/pad.rs",
         "nodes/src/devices/stream/driver.rs",
         "nodes/src/tool/sniff.rs",
     ];

@@ -210,3 +210,22 @@ fn while_it_runs_the_curves_are_those_of_the_last_ten_seconds() {
     assert!(live.iter().all(|[first, last]| last - first < 10.5), "{live:?}");
     assert!(live.iter().any(|[first, _]| *first > 0.0), "{live:?}");
 }
+
+#[test]
+fn a_run_in_virtual_time_pauses_and_goes_on_at_a_word() {
+    use std::io::Write;
+    let args = ["run", "graphs/hybrid.toml", "--step=500ms", "--for", "4s"];
+    let mut command = crate::tool::tool(&args);
+    command.stdin(std::process::Stdio::piped()).stdout(std::process::Stdio::piped());
+    let mut run = command.spawn().unwrap();
+    run.stdin.take().unwrap().write_all(b"\n\n200ms\nwhat\nq\n").unwrap();
+    let out = String::from_utf8(run.wait_with_output().unwrap().stdout).unwrap();
+    let pauses: Vec<&str> = out.lines().filter(|line| line.contains(" s, tick ")).collect();
+    let times: Vec<&str> = pauses.iter().map(|line| line.split(' ').next().unwrap()).collect();
+    assert_eq!(times, ["0.000", "0.500", "1.000", "1.200", "1.200"], "{out}");
+    assert!(pauses[0].contains("Enter: on to the next pause") && pauses[4].contains("`what` is no word here"), "{out}");
+    assert!(out.contains("mode servo for 0.2 s") && out.contains("limited by"), "{out}");
+    assert!(out.contains("interrupted after 1.200 s and 301 ticks"), "{out}");
+    let refused = crate::tool::say(&["run", "graphs/hybrid.toml", "--step", "--realtime"]);
+    assert!(refused.code == 2 && refused.err.contains("`--step` requires virtual time"), "{}", refused.err);
+}

@@ -12,9 +12,6 @@ use crate::outline::{Outline, ValueOrigin};
 use crate::record::{PortColumns, file_seconds as seconds};
 use crate::source::{SourceMap, suggest_name, suggestion};
 
-/// Maximum number of `*` in a pattern: the time that a pattern takes grows with each of them.
-const MAX_STARS: usize = 4;
-
 /// What the socket states of a run, taken from the graph before it runs.
 #[derive(Debug, Clone)]
 pub struct RunFacts {
@@ -56,14 +53,6 @@ fn origins(outline: &Outline, graph: &Path) -> Vec<(String, Origin)> {
         }
     }
     origins
-}
-
-/// Checks that a pattern takes no long time.
-fn check_pattern(pattern: &str) -> Result<(), String> {
-    match pattern.matches('*').count() {
-        0..=MAX_STARS => Ok(()),
-        _ => Err(format!("a pattern has at most {MAX_STARS} `*`: ask for several ports, or for everything")),
-    }
 }
 
 /// A number of a port.
@@ -146,7 +135,6 @@ impl Described {
     /// # Errors
     /// If none does.
     pub(super) fn got(&self, frame: &Frame, whole: &Whole, pattern: Option<&str>) -> Result<Got, String> {
-        pattern.map_or(Ok(()), check_pattern)?;
         let live =
             self.live.iter().zip(&whole.live).filter(|(param, _)| pattern.is_none_or(|p| matches(p, &param.name)));
         let live: Vec<LiveState> =
@@ -192,7 +180,6 @@ impl Described {
     pub(super) fn find_all(&self, patterns: &[String]) -> Result<Vec<(usize, String)>, String> {
         let mut found = BTreeMap::new();
         for pattern in patterns {
-            check_pattern(pattern)?;
             let mut is_any = false;
             for (at, name) in self.find(pattern) {
                 found.entry(at).or_insert_with(|| name.to_owned());

@@ -28,6 +28,10 @@ use crate::engine::{ChangeRequest, Engine, StopRequests};
 
 /// Maximum number of clients.
 const MAX_CLIENTS: usize = 64;
+/// Maximum number of further clients, each of which may stop the run and do nothing else.
+const MAX_STOPPING: usize = 8;
+/// Time that such a client has for its request.
+const STOP_TIME: Duration = Duration::from_millis(100);
 /// Maximum number of changes that wait for their check.
 const MAX_CHANGES: usize = 16;
 /// A client that asks nothing for this time is disconnected.
@@ -123,7 +127,7 @@ fn serve(shared: Shared, over: oneshot::Receiver<()>) -> io::Result<()> {
         let hub = Rc::new(Hub::new(shared.facts, shared.ring, shared.stops, shared.changes));
         let worker = Rc::clone(&hub);
         tokio::task::spawn_local(async move { worker.work().await });
-        let places = Arc::new(Semaphore::new(MAX_CLIENTS));
+        let places = [MAX_CLIENTS, MAX_STOPPING].map(|places| Arc::new(Semaphore::new(places)));
         tokio::select! {
             () = accept(&listener, &hub, &places) => {}
             _ = over => {}
@@ -141,7 +145,7 @@ fn serve(shared: Shared, over: oneshot::Receiver<()>) -> io::Result<()> {
 }
 
 /// Accepts clients for ever.
-async fn accept(listener: &UnixListener, hub: &Rc<Hub>, places: &Arc<Semaphore>) {
+async fn accept(listener: &UnixListener, hub: &Rc<Hub>, places: &[Arc<Semaphore>; 2]) {
     loop {
         let Ok((stream, _)) = listener.accept().await else {
             // For example without a free file descriptor.
@@ -152,19 +156,37 @@ async fn accept(listener: &UnixListener, hub: &Rc<Hub>, places: &Arc<Semaphore>)
         if !is_own {
             continue;
         }
-        let place = Arc::clone(places).try_acquire_owned();
+        let [place, to_stop] = places.each_ref().map(|places| Arc::clone(places).try_acquire_owned());
         let hub = Rc::clone(hub);
         tokio::task::spawn_local(async move {
             let (read, mut write) = stream.into_split();
-            match place {
-                // A client that has gone needs no answer.
-                Ok(_place) => drop(talk(read, &mut write, &hub).await),
-                Err(_) => {
-                    let full = format!("the run has {MAX_CLIENTS} clients already: end one of them");
-                    drop(answer::<()>(&mut write, Err(full)).await);
+            // A client that has gone needs no answer.
+            let _ = match (place, to_stop) {
+                (Ok(_place), unused) => {
+                    drop(unused);
+                    talk(read, &mut write, &hub).await
                 }
-            }
+                (Err(_), Ok(_place)) => stop(read, &mut write, &hub).await,
+                (Err(_), Err(_)) => answer::<()>(&mut write, Err(full())).await,
+            };
         });
+    }
+}
+
+fn full() -> String {
+    format!("the run has {MAX_CLIENTS} clients already: end one of them")
+}
+
+/// Takes one request of a client for which there is no place: a stop is never refused for that.
+async fn stop(read: OwnedReadHalf, write: &mut OwnedWriteHalf, hub: &Hub) -> io::Result<()> {
+    let mut reader = BufReader::new(read);
+    let line = match timeout(STOP_TIME, read_line(&mut reader)).await {
+        Ok(Ok(Line::Whole(line))) => line,
+        _ => return answer::<()>(write, Err(full())).await,
+    };
+    match serde_json::from_slice(&line) {
+        Ok(Ask::Send { word }) => answer(write, hub.send(&word)).await,
+        _ => answer::<()>(write, Err(full())).await,
     }
 }
 

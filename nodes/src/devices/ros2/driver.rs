@@ -188,7 +188,7 @@ impl Session {
         (self.is_lost, self.bad, self.number) = (false, None, self.number + 1);
         let is_ready = matches!(self.phase, Phase::Ready { .. });
         // A graph that is held because the arm is not ready yet would wait for the operator.
-        if !is_ready && self.begin.elapsed() < self.arm.site.patience {
+        if !is_ready && !link.is_mute() && self.begin.elapsed() < self.arm.site.patience {
             return;
         }
         let stamp = if stamp == 0 { link.arrival() } else { link.stamp_of(stamp) };
@@ -279,8 +279,8 @@ impl Session {
         let dt = self.sent.elapsed().as_secs_f64();
         self.sent = Instant::now();
         // Without a message for so long, the arm has stopped by itself, and is not where the commands were going.
-        let has_stopped = dt > self.arm.commanded.lifespan && !self.course.rests();
-        if link.is_mute() || has_stopped {
+        let is_too_long = dt > self.arm.commanded.lifespan || link.is_mute();
+        if is_too_long && !self.course.rests() {
             self.course.halt();
             (self.has_ended, self.has_stopped) = (true, true);
             self.phase = Phase::Waiting { since: Instant::now() };

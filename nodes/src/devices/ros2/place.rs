@@ -17,7 +17,7 @@ pub(super) struct Place {
     #[param(default = "127.0.0.1")]
     network: String,
     /// Time until something must have come, or must read the commands.
-    #[param(unit = "s", range = 0.1..=120.0, default = 5.0)]
+    #[param(unit = "s", range = 0.1..=120.0, default = 3.0)]
     connect_s: f64,
 }
 

@@ -11,6 +11,7 @@ mod ports;
 mod progress;
 mod slow;
 mod status;
+mod stepping;
 pub(super) mod summary;
 pub(super) mod target;
 mod time;
@@ -24,6 +25,7 @@ use files::OutputFiles;
 use log::NodeLog;
 use outside::{Outside, changes};
 use progress::Progress;
+use stepping::Stepping;
 use summary::Summary;
 
 use super::shell::command::GraphArgs;
@@ -106,6 +108,10 @@ pub struct JobOptions {
     /// Read words from standard input during the run, one per line; requires real time
     #[arg(long)]
     pub listen: bool,
+    /// Pause after each tick, or each TIME, and show what the run does; it goes on at a line on standard input. In virtual
+    /// time only
+    #[arg(long, value_name = "TIME", num_args = 0..=1, require_equals = true, value_parser = duration)]
+    pub step: Option<Option<f64>>,
     /// Open no socket, so that `ps`, `get`, `set`, `send` and `watch` do not reach the run; in virtual time there is none
     #[cfg(unix)]
     #[arg(long)]
@@ -181,6 +187,7 @@ impl Job {
         if *listen && !is_real {
             return Err("`--listen` requires real time: add `--realtime`, or send words with `--send 2s:resume`".into());
         }
+        stepping::check(self.options.step, is_real)?;
         let chosen = points.as_ref().map(|wanted| wanted.resolve(&plan)).transpose()?;
         let mut warnings = plan.warnings().into_iter().flat_map(|report| report.diagnostics);
         let start = warnings.find(|warning| warning.code == Code::StartOutside).map(|warning| warning.message);
@@ -198,7 +205,8 @@ impl Job {
             files => files?,
         };
         // In virtual time nothing moves, so nothing needs to be lost. The shell keeps the signals until the process ends.
-        let patience = if is_real { Patience::Limited(interrupt) } else { Patience::Interruptible(interrupt) };
+        let patience = if is_real { Patience::Limited } else { Patience::Interruptible };
+        let patience = patience(Arc::clone(&interrupt));
         shell.set_patience(&patience);
         if self.print != Print::Nothing {
             shell.print_text();
@@ -215,6 +223,7 @@ impl Job {
         let (sends, listens) = (send.clone(), *listen);
         let mut options =
             RunOptions { duration: *duration, is_realtime: *realtime, sends, listens, ..RunOptions::default() };
+        let mut stepping = Stepping::of(self.options.step, &mut options, &interrupt)?;
         let Outside { mut changes, mut socket } = Outside::open(changes, facts, &engine, &mut options, shell);
         let outcome = without_panic_messages(|| {
             let mut observe = |engine: &Engine| {
@@ -225,6 +234,10 @@ impl Job {
                 files.add(engine, &patience);
                 socket.iter_mut().for_each(|socket| socket.publish(engine));
                 progress.show(seconds(engine.now()), engine.ticks(), |style| summary.live(engine, style));
+                if let Some(stepping) = &mut stepping {
+                    let show = |words: &str| shell.say(&paused(engine, &summary, shell.has_colour(), words));
+                    stepping.after(seconds(engine.now()), show);
+                }
             };
             match &mut changes {
                 Some(changes) => engine::run_changing(&mut engine, &options, changes, &mut observe),
@@ -240,7 +253,9 @@ impl Job {
             self.say(shell, &format!("\n{}", summary.render(&engine, outcome, style).trim_end()));
             self.say(shell, &ending(outcome));
         }
+        let unfinished = changes.map_or_else(Vec::new, |changes| changes.unfinished(&engine));
         let code = self.report_end(shell, &engine, outcome);
+        unfinished.iter().for_each(|line| shell.warning(line));
         Ok(code.max(files.finish(shell, &engine)))
     }
 
@@ -301,6 +316,13 @@ fn endless_stop(engine: &Engine, fault: &Fault) -> &'static str {
 }
 
 /// Describes how a run ended, and its speed.
+/// Writes what a paused run does, and what may be typed.
+fn paused(engine: &Engine, summary: &Summary, has_colour: bool, words: &str) -> String {
+    let state = summary.live(engine, PageStyle::new(has_colour)).join("\n");
+    let line = format!("{:.3} s, tick {}: {words}", seconds(engine.now()), engine.ticks());
+    format!("{}\n{}", state.trim_end(), line.trim_end_matches([':', ' ']))
+}
+
 fn ending(outcome: &Outcome) -> String {
     let interrupted = outcome.signal.map(|signal| format!("interrupted by {signal}"));
     let reason = match outcome.end {

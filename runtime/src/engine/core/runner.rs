@@ -126,7 +126,9 @@ impl NodeRunner {
     /// Exchanges all configurations with those of another node of the same type. It keeps its state, and uses the new
     /// configuration in its next step.
     pub(crate) fn exchange(&mut self, other: &mut dyn AnyNode) {
-        self.node.exchange(other);
+        // Both were built from the same block, so they have as many configurations.
+        let is_same = self.node.exchange(other);
+        debug_assert!(is_same, "another node than that of this place");
     }
 
     /// Steps the node if a trigger is new or lost, or makes its outputs absent if a required input is. Sets the tick's

@@ -146,6 +146,11 @@ impl<'c> Changer<'c> {
         Walk { from, to, seconds: if from == to { 0.0 } else { (waiting + steps) * self.period } }
     }
 
+    /// Returns the value toward which each parameter moves, in the order of `[live]`.
+    pub(super) fn targets(&self) -> impl Iterator<Item = f64> {
+        self.fronts.iter().map(|[_, target]| *target)
+    }
+
     /// Whether a parameter is on its way to its target.
     pub(super) fn is_moving(&self) -> bool {
         self.fronts.iter().any(|[value, target]| value.to_bits() != target.to_bits())
@@ -158,15 +163,23 @@ impl<'c> Changer<'c> {
     pub fn prepare(&mut self) -> Result<(), String> {
         while self.back.pop().is_ok() {}
         while MAX_STEPS - self.steps.slots() < self.lead {
-            let Some(step) = self.next_step()? else { break };
+            let (step, refused) = match self.next_step() {
+                Ok(None) => break,
+                Ok(Some(step)) => (step, Ok(())),
+                Err((stays, why)) => (stays, Err(why)),
+            };
             // There is room, and without an engine nobody misses the step.
             let _ = self.steps.push(step);
+            refused?;
         }
         Ok(())
     }
 
     /// Builds the next step, or returns `None` if every parameter has its value.
-    fn next_step(&mut self) -> Result<Option<Step>, String> {
+    ///
+    /// # Errors
+    /// Returns why a node refuses a value, and a step that changes no node: its parameters stay where they are.
+    fn next_step(&mut self) -> Result<Option<Step>, (Step, String)> {
         let mut values = Vec::new();
         for (at, (param, [value, target])) in self.plan.params.iter().zip(&self.fronts).enumerate() {
             if value.to_bits() != target.to_bits() {
@@ -190,7 +203,8 @@ impl<'c> Changer<'c> {
             }
             Err(why) => {
                 changed.iter().for_each(|at| self.fronts[*at][1] = self.fronts[*at][0]);
-                Err(why)
+                let values = changed.into_iter().map(|at| (at, self.fronts[at])).collect();
+                Err((Step { nodes: Vec::new(), values }, why))
             }
         }
     }

@@ -2,11 +2,13 @@
 //! every run is the same; in real time by a thread of their own, so that no tick waits for them.
 
 use std::collections::VecDeque;
+use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::atomic::{AtomicBool, AtomicI64, Ordering};
 use std::sync::mpsc::{Receiver, RecvTimeoutError};
 use std::time::Duration;
 
 use super::changer::{Changer, Walk};
+use super::engine::Engine;
 
 /// Interval at which the thread looks for work. The steps in the ring last longer.
 const LOOK: Duration = Duration::from_millis(2);
@@ -62,8 +64,28 @@ impl<'c> ScheduledChanges<'c> {
         }
     }
 
-    /// Prepares steps until the run is over. `now` is the time of the graph [ns].
+    /// Returns the parameters that have not reached their values, in words; those of `engine` hold.
+    #[must_use]
+    pub fn unfinished(&self, engine: &Engine) -> Vec<String> {
+        let values = engine.live_values().zip(self.changer.targets());
+        let left = values.filter(|(live, target)| live.value.to_bits() != target.to_bits());
+        left.map(|(live, target)| {
+            format!("`{}` was {} at the end, on its way to {target}", live.param.name, live.value)
+        })
+        .collect()
+    }
+
+    /// Prepares steps until the run is over. `now` is the time of the graph [ns]. A panic ends the changes, and not the
+    /// run.
     pub(super) fn work(&mut self, now: &AtomicI64, is_over: &AtomicBool) {
+        if catch_unwind(AssertUnwindSafe(|| self.work_until(now, is_over))).is_err() {
+            tracing::error!("no parameter changes any more: the thread that prepares changes has failed");
+            // Whoever waits for an answer gets none.
+            self.requests = None;
+        }
+    }
+
+    fn work_until(&mut self, now: &AtomicI64, is_over: &AtomicBool) {
         while !is_over.load(Ordering::Relaxed) {
             self.prepare(now.load(Ordering::Relaxed));
             let is_idle = self.due.is_empty() && !self.changer.is_moving();

@@ -186,6 +186,17 @@ impl<'a> Opener<'a> {
         }
     }
 
+    /// There is no such device type: a misspelt one, or one that this build leaves out.
+    fn unknown_type(&self, kind: &Spanned<String>) -> Diagnostic {
+        if let Some(how) = self.catalogue.how_to_get(&kind.value) {
+            let message = format!("this build leaves out the device type `{}`", kind.value);
+            return Diagnostic::new(Code::UnknownType, kind.span.clone(), message).help(how);
+        }
+        let names: Vec<_> = self.catalogue.devices().iter().map(|device| device.name()).collect();
+        let known = names.iter().map(|name| &**name);
+        Diagnostic::unknown(Code::UnknownType, "device type", &kind.value, &kind.span, known)
+    }
+
     /// Checks the types of all devices, and the parameters of those that are not opened because none of the `roles`
     /// uses them.
     pub(super) fn check_devices(&mut self, bench: &BenchDocument, roles: &BTreeSet<&str>) {
@@ -194,10 +205,7 @@ impl<'a> Opener<'a> {
         for device in &bench.devices {
             let Some(kind) = &device.kind else { continue };
             let Some(known) = self.catalogue.find_device(&kind.value) else {
-                let names: Vec<_> = self.catalogue.devices().iter().map(|device| device.name()).collect();
-                let known = names.iter().map(|name| &**name);
-                let unknown = Diagnostic::unknown(Code::UnknownType, "device type", &kind.value, &kind.span, known);
-                self.diagnostics.push(unknown);
+                self.diagnostics.push(self.unknown_type(kind));
                 continue;
             };
             // A device that is opened checks its own parameters.

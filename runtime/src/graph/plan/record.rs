@@ -32,9 +32,15 @@ impl RecordedPorts {
 
 /// Whether a name matches a pattern, in which `*` stands for any text.
 pub(crate) fn matches(pattern: &str, name: &str) -> bool {
-    let Some((start, rest)) = pattern.split_once('*') else { return pattern == name };
-    let Some(name) = name.strip_prefix(start) else { return false };
-    (0..=name.len()).filter(|end| name.is_char_boundary(*end)).any(|end| matches(rest, &name[end..]))
+    let mut parts = pattern.split('*');
+    let Some(mut rest) = name.strip_prefix(parts.next().unwrap_or_default()) else { return false };
+    let Some(last) = parts.next_back() else { return rest.is_empty() };
+    // The first place of each part leaves the most for those behind it.
+    for part in parts {
+        let Some(at) = rest.find(part) else { return false };
+        rest = &rest[at + part.len()..];
+    }
+    rest.ends_with(last)
 }
 
 #[cfg(test)]
@@ -52,9 +58,21 @@ mod tests {
             ("*.x", "touch.y", false),
             ("t*h.*", "touch.x", true),
             ("*", "", true),
+            ("a*a", "a", false),
+            ("a*a", "aa", true),
+            ("a*b*a", "abba", true),
+            ("a*b*b*a", "aba", false),
+            ("*x*y", "xyxy", true),
+            ("*\u{e4}*", "m\u{e4}h", true),
         ];
         for (pattern, name, does) in cases {
             assert_eq!(matches(pattern, name), does, "{pattern} {name}");
         }
+    }
+
+    #[test]
+    fn many_stars_take_no_longer() {
+        let (pattern, name) = (format!("{}b", "*a".repeat(4000)), "a".repeat(8000));
+        assert!(!matches(&pattern, &name) && matches(&pattern, &(name + "b")));
     }
 }
