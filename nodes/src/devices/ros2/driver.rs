@@ -274,6 +274,8 @@ impl Session {
 
     /// Sends what holds now.
     fn send(&mut self, link: &mut Link) {
+        // The stamp is older than the commands: if the process is suspended from here on, they are too old when they leave.
+        let made = wall_clock();
         // The lease must be asked in every cycle, also when nothing is sent.
         let commands = link.commands().joints(self.arm.ports.velocity).to_vec();
         let dt = self.sent.elapsed().as_secs_f64();
@@ -300,20 +302,26 @@ impl Session {
         let is_due = !(rests && self.has_ended) || is_checked && !self.output.ends_at_rest();
         if is_due {
             self.has_ended = rests;
-            if !self.output.say(&self.course, &self.arm.names) {
+            if !self.output.say(&self.course, &self.arm.names, made) {
                 link.count("commands that were not sent");
             }
         }
     }
 
-    /// Repeats at the end of a run that the arm is to rest, in case a message was lost.
+    /// Repeats at the end of a run that an arm that follows velocities is to rest, in case a message was lost.
+    ///
+    /// A trajectory ends at rest by itself. Another one would move an arm that has stopped on its own, as while this process
+    /// was suspended, back to where it was last commanded.
     async fn leave(&mut self, link: &Link) {
+        if self.output.ends_at_rest() {
+            return;
+        }
         self.course.halt();
         for _ in 0..3 {
             if link.is_mute() || self.is_first {
                 return;
             }
-            self.output.say(&self.course, &self.arm.names);
+            self.output.say(&self.course, &self.arm.names, wall_clock());
             sleep(Duration::from_millis(10)).await;
         }
     }

@@ -51,10 +51,10 @@ impl Output {
         }
     }
 
-    /// Sends what an arm is to do. Returns whether it was taken.
-    pub(super) fn say(&self, course: &Course, names: &[String]) -> bool {
+    /// Sends what an arm is to do, as it was made at a time [ns, wall clock]. Returns whether it was taken.
+    pub(super) fn say(&self, course: &Course, names: &[String], made: i64) -> bool {
         match self {
-            Self::Trajectory(writer, horizon) => writer.send(course.trajectory(names, wall_clock(), *horizon)),
+            Self::Trajectory(writer, horizon) => writer.send(course.trajectory(names, made, *horizon)),
             Self::Velocity(writer) => writer.send(course.velocities()),
         }
     }
