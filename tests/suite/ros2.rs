@@ -277,11 +277,95 @@ fn what_goes_wrong_while_the_arm_moves_stops_it() {
         ("second", "somebody else publishes on `/command` too"),
         ("twin", "two programs publish our joints on `/joint_states`"),
         ("quiet", "is lost: `/joint_states` is published as sensor_msgs/msg/JointState, but no message arrives"),
+        ("nan", "`arm.position` is not a finite number"),
         ("blind", "`pad.image` is lost: `/tactile` is published as sensor_msgs/msg/Image, but no message arrives"),
     ];
     for (i, (word, expected)) in cases.into_iter().enumerate() {
         assert_says(60 + i as u32, json!({}), Some(word), expected);
     }
+}
+
+/// A task that reads a force sensor alone, with a part of the bench.
+fn of_force(robot: &Robot, params: &str) -> (TempDir, String) {
+    let (folder, path) = in_new_folder("force.toml");
+    let text = r#"
+        [graph]
+        clock = "force"
+        [roles]
+        force = { type = "force_sensor", on = "none" }
+        [nodes.smooth]
+        type = "low_pass"
+        cutoff_hz = 10.0
+        in.value = "force.fz"
+        [bind]
+        force = "wrist"
+        [devices.wrist]
+        type = "ros2_force"
+        topic = "/wrench"
+        rate_hz = 250.0
+        connect_s = 2.0
+        "#;
+    fs::write(&path, format!("{text}domain = {}\n{params}", robot.domain)).unwrap();
+    (folder, path)
+}
+
+#[test]
+fn a_wrench_arrives_in_the_frame_of_the_tip() {
+    let Some(robot) = Robot::start(37, json!({ "wrench": [1.0, 2.0, 3.0, 0.1, 0.2, 0.3] })) else { return };
+    // By hand: the frame of the sensor is turned by a right angle about z, so (x, y) becomes (-y, x), and stands 0.1 m in
+    // front of the tip, so the torque of the force (-2, 1, 3) is (-0.1, -0.2, 0) more. The reaction has the other sign.
+    let frame = "frame = { xyz = [0.0, 0.0, 0.1], rpy = [0.0, 0.0, 1.5707963267948966] }\n";
+    let turned = [-2.0, 1.0, 3.0, -0.2 - 0.1, 0.1 - 0.2, 0.3];
+    for (params, expected) in [
+        (String::new(), [1.0, 2.0, 3.0, 0.1, 0.2, 0.3]),
+        (frame.to_owned(), turned),
+        (format!("{frame}is_reaction = true"), turned.map(|value| -value)),
+    ] {
+        let (folder, path) = of_force(&robot, &params);
+        let out = folder.path().join("run.csv");
+        let ran = said(&mut tool(&["run", &path, "--quiet", "--for", "1s", "--out", out.to_str().unwrap()]));
+        assert_eq!(ran.code, 0, "{}", ran.err);
+        let last = rows(out.to_str().unwrap()).pop().unwrap();
+        for (name, expected) in ["fx", "fy", "fz", "tx", "ty", "tz"].into_iter().zip(expected) {
+            let found = last[&format!("force.{name}")];
+            assert!((found - expected).abs() < 1e-9, "{params}{name}: {found}, and not {expected}");
+        }
+    }
+}
+
+#[test]
+fn a_force_sensor_of_another_type_or_without_a_number_is_named() {
+    for (domain, settings, expected) in [
+        (38, json!({ "wrench_type": "String" }), "`/wrench` has messages of the type std_msgs/msg/String, and not"),
+        (39, json!({ "wrench": ["nan", 0, 0, 0, 0, 0] }), "`force.wrench` is not a finite number"),
+    ] {
+        let Some(robot) = Robot::start(domain, settings) else { return };
+        let (_folder, path) = of_force(&robot, "");
+        let ran = said(&mut tool(&["run", &path, "--quiet", "--for", "5s"]));
+        assert!(ran.code != 0 && ran.err.contains(expected), "{expected}: {}", ran.err);
+    }
+}
+
+#[test]
+fn the_domain_of_the_environment_holds_where_the_bench_states_none() {
+    let Some(robot) = Robot::start(70, json!({})) else { return };
+    let (_folder, bench) = robot.bench(&[("domain = 70\n", "")]);
+    let doctor = |id: &str| said(tool(&["doctor", &bench, "--for", "4s"]).env("ROS_DOMAIN_ID", id));
+    let there = doctor("70");
+    assert_eq!(there.code, 0, "{}{}", there.out, there.err);
+    for (id, expected) in [
+        ("71", "in the domain 71, where no topic of ROS is published"),
+        ("lab", "ROS_DOMAIN_ID is `lab`, and not a number from 0 to 101"),
+    ] {
+        let other = doctor(id);
+        assert!(
+            other.code != 0 && (other.out.clone() + &other.err).contains(expected),
+            "{id}: {}{}",
+            other.out,
+            other.err
+        );
+    }
+    assert!(robot.count("taken") == 0 && robot.speed(0.0) < STILL, "the doctor commands the arm");
 }
 
 #[test]

@@ -10,7 +10,7 @@ presses. Friction, the weight of the arm and the flexibility of its joints are l
 It prints a line of JSON every 20 ms: its wall clock, joints, their largest speed since the last line, the force, how many
 commands it has taken and refused, and how old those since the last line were when they came. It
 reads words: `quiet` and `talk` (the joint states), `blind` and `see` (the image), `second` (another publisher of commands),
-`twin` (another publisher of joints), `hang SECONDS`.
+`twin` (another publisher of joints), `nan` (the position of a joint), `hang SECONDS`.
 """
 
 import json
@@ -30,6 +30,9 @@ SETTINGS = {
     "nan_at": None,
     "state_type": "JointState",
     "pad": "image",
+    # The force [N] and the torque [N m] in the messages of the force sensor, or "nan"; None is the force on the pad.
+    "wrench": None,
+    "wrench_type": "WrenchStamped",
     "rows": 16,
     "start": [0.0, 0.5, 0.0, -1.3, 0.0, 1.3, 0.0],
     "reader_durability": "volatile",
@@ -162,7 +165,8 @@ class Robot:
         self.pad = None
         if SETTINGS["pad"]:
             self.pad = DataWriter(self.participant, topic(self.participant, "/tactile", pads[SETTINGS["pad"]]), qos=best_effort)
-        self.wrench = DataWriter(self.participant, topic(self.participant, "/wrench", ros.WrenchStamped), qos=best_effort)
+        self.wrench_type = getattr(ros, SETTINGS["wrench_type"])
+        self.wrench = DataWriter(self.participant, topic(self.participant, "/wrench", self.wrench_type), qos=best_effort)
         kinds = {"trajectory": "JointTrajectory", "velocity": "Float64MultiArray"}
         self.commands, self.rival = None, None
         self.command_kind = getattr(ros, SETTINGS["reader_type"] or kinds.get(SETTINGS["command"], "String"))
@@ -226,7 +230,9 @@ class Robot:
                 channels = [ros.ChannelFloat32("thumb", [0.0]), ros.ChannelFloat32("palm", cells.ravel().tolist())]
                 self.pad.write(ros.TactileState(header, channels))
         force = float(cells.sum())
-        self.wrench.write(ros.WrenchStamped(header, ros.Wrench(force=ros.Vector3(0.0, 0.0, -force))))
+        if self.wrench_type is ros.WrenchStamped:
+            fx, fy, fz, tx, ty, tz = map(float, SETTINGS["wrench"] or [0, 0, -force, 0, 0, 0])
+            self.wrench.write(ros.WrenchStamped(header, ros.Wrench(ros.Vector3(fx, fy, fz), ros.Vector3(tx, ty, tz))))
         return force
 
     def joint_state(self, header):
@@ -245,6 +251,8 @@ class Robot:
             self.twin = DataWriter(self.participant, twin, qos=Qos(Policy.Reliability.BestEffort))
         elif word in ("quiet", "talk"):
             self.talks = word == "talk"
+        elif word == "nan":
+            SETTINGS["nan_at"] = 0.0
         elif word in ("blind", "see"):
             self.sees = word == "see"
         elif word.startswith("hang "):

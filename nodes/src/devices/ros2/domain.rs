@@ -20,6 +20,9 @@ use super::message::{Message, dds_type, ros_type};
 /// Highest number of a domain whose ports exist on every system.
 pub(super) const MAX_DOMAIN: usize = 101;
 
+/// Number of writers of a topic whose types are remembered.
+const MAX_TRUSTED: usize = 16;
+
 /// A participant of a domain.
 pub(super) struct Domain {
     id: u16,
@@ -37,7 +40,12 @@ pub(super) struct Peer {
 }
 
 /// The messages of a topic.
-pub(super) struct Reader<M: Message>(DataReaderStream<M, CDRDeserializerAdapter<M>>);
+pub(super) struct Reader<M: Message> {
+    messages: DataReaderStream<M, CDRDeserializerAdapter<M>>,
+    participant: DomainParticipant,
+    /// Writers that have our type.
+    trusted: Vec<GUID>,
+}
 
 /// Writes messages to a topic.
 pub(super) struct Writer<M: Message> {
@@ -88,7 +96,9 @@ impl Domain {
             .build();
         let topic = self.topic::<M>(name, &qos)?;
         let reader = self.subscriber.create_datareader_no_key(&topic, None);
-        reader.map(|reader| Reader(reader.async_sample_stream())).map_err(|error| refused(name, &error))
+        let reader = reader.map_err(|error| refused(name, &error))?;
+        let messages = reader.async_sample_stream();
+        Ok(Reader { messages, participant: self.participant.clone(), trusted: Vec::new() })
     }
 
     /// Writes a topic: reliable, the newest message only, and none that is older than `lifespan`.
@@ -173,17 +183,40 @@ impl<M: Message> Reader<M> {
     /// Waits for the next message. Returns it with its writer.
     ///
     /// # Errors
-    /// If a message is not of the type that its writer states.
+    /// If a message is not of our type, or not of the one that its writer states.
     pub(super) async fn next(&mut self) -> Result<(M, GUID), String> {
-        match self.0.next().await {
+        match self.messages.next().await {
             Some(Ok(sample)) => {
                 let writer = sample.sample_info().publication_handle();
+                self.trust(writer)?;
                 Ok((sample.into_value(), writer))
             }
             Some(Err(error)) => Err(format!("a message is no {}: {error}", M::TYPE)),
             // The stream of a reader has no end.
             None => std::future::pending().await,
         }
+    }
+
+    /// Compares the type of a writer with ours. The library does not, and the bytes of a twist are those of a wrench.
+    fn trust(&mut self, writer: GUID) -> Result<(), String> {
+        if self.trusted.contains(&writer) {
+            return Ok(());
+        }
+        let writers = self.participant.discovered_writers().into_iter().map(|writer| writer.publication_topic_data);
+        let kind = writers.filter(|data| data.key == writer).map(|data| ros_type(&data.type_name)).next();
+        check_type(kind.as_deref(), M::TYPE)?;
+        self.trusted.truncate(MAX_TRUSTED - 1);
+        self.trusted.insert(0, writer);
+        Ok(())
+    }
+}
+
+/// Compares the type that a writer states with the one that is read.
+fn check_type(stated: Option<&str>, read: &str) -> Result<(), String> {
+    match stated {
+        Some(stated) if stated == read => Ok(()),
+        Some(stated) => Err(format!("a message of the type {stated}, and not {read}")),
+        None => Err(format!("a message of a publisher that states no type, and not {read}")),
     }
 }
 
@@ -227,4 +260,52 @@ fn dds_name(name: &str) -> String {
 
 fn refused(name: &str, error: &dyn std::fmt::Debug) -> String {
     format!("the topic `{name}` cannot be used: {error:?}")
+}
+
+#[cfg(test)]
+mod tests {
+    use std::net::Ipv4Addr;
+
+    use serde::{Deserialize, Serialize};
+
+    use super::super::message::{Header, WrenchStamped};
+    use super::*;
+
+    /// `geometry_msgs/msg/TwistStamped`, whose bytes are those of a wrench.
+    #[derive(Default, Serialize, Deserialize)]
+    struct TwistStamped {
+        header: Header,
+        linear: [f64; 3],
+        angular: [f64; 3],
+    }
+
+    impl Message for TwistStamped {
+        const TYPE: &'static str = "geometry_msgs/msg/TwistStamped";
+    }
+
+    /// Returns what a reader of wrenches gets from a writer of another participant.
+    async fn received<M: Message + Default>(topic: &str) -> Result<(), String> {
+        let join = || Domain::join(99, Ipv4Addr::LOCALHOST.into()).unwrap();
+        let (ours, other) = (join(), join());
+        let mut reader = ours.read::<WrenchStamped>(topic).unwrap();
+        let writer = other.write::<M>(topic, Duration::from_secs(1)).unwrap();
+        let mut sending = tokio::time::interval(Duration::from_millis(20));
+        let send = async {
+            for _ in 0..500 {
+                sending.tick().await;
+                writer.send(M::default());
+            }
+        };
+        tokio::select! {
+            message = reader.next() => message.map(|_| ()),
+            () = send => panic!("nothing arrives on {topic}"),
+        }
+    }
+
+    #[tokio::test]
+    async fn a_message_of_another_type_with_the_same_bytes_is_not_taken() {
+        assert_eq!(received::<WrenchStamped>("/wrench").await, Ok(()));
+        let expected = "a message of the type geometry_msgs/msg/TwistStamped, and not geometry_msgs/msg/WrenchStamped";
+        assert_eq!(received::<TwistStamped>("/twist").await, Err(expected.to_owned()));
+    }
 }

@@ -91,24 +91,30 @@ impl Live for ForceDriver {
         let mut reader = domain.read::<WrenchStamped>(&self.topic).map_err(DeviceError)?;
         let stopped = link.stopped();
         tokio::pin!(stopped);
-        let (mut limit, mut is_lost, mut number) = (Instant::now() + self.site.patience, false, 0);
+        let (mut limit, mut number) = (Instant::now() + self.site.patience, 0);
+        let (mut is_lost, mut bad) = (false, None);
         loop {
             tokio::select! {
                 biased;
                 () = &mut stopped => return Ok(()),
                 () = sleep_until(limit.into()), if !is_lost => {
                     is_lost = true;
-                    self.ports.lose(&mut link, &domain.why_silent::<WrenchStamped>(&self.topic));
+                    let why = bad.take().unwrap_or_else(|| domain.why_silent::<WrenchStamped>(&self.topic));
+                    self.ports.lose(&mut link, &why);
                 }
                 message = reader.next() => match message {
                     Ok((message, _)) => {
-                        (limit, is_lost, number) = (Instant::now() + self.timeout, false, number + 1);
+                        (limit, number) = (Instant::now() + self.timeout, number + 1);
+                        (is_lost, bad) = (false, None);
                         let stamp = message.header.stamp.nanos();
                         let stamp = if stamp == 0 { link.arrival() } else { link.stamp_of(stamp) };
                         let wrench = self.wrench(&message);
                         link.publish(|samples| self.ports.write(samples, stamp, number, &wrench));
                     }
-                    Err(_) => link.count("bad messages"),
+                    Err(why) => {
+                        link.count("bad messages");
+                        bad = Some(format!("`{}`: {why}", self.topic));
+                    }
                 },
             }
         }
