@@ -93,6 +93,7 @@ mod socket;
 #[cfg(target_os = "linux")]
 mod stream;
 mod svg;
+mod tare;
 mod task_crossings;
 mod task_drivers;
 mod task_folder;

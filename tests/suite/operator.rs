@@ -159,7 +159,7 @@ fn a_word_that_nothing_waits_for_is_told() {
     let refused = say(&["run", HYBRID, MOCK, "--send", "1s:bck"]);
     assert_eq!((refused.code, refused.out.as_str()), (2, ""));
     assert!(
-        refused.err.contains("error: unknown word `bck`\nhelp: this graph accepts `resume`, `stop`"),
+        refused.err.contains("error: unknown word `bck`\nhelp: this graph accepts `resume`, `stop`, `tare`"),
         "{}",
         refused.err
     );

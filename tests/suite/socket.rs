@@ -202,7 +202,8 @@ fn garbage_is_refused_and_delays_nobody() {
     let cases = [
         ("go", "this line is no request"),
         ("{}", "missing field `ask`"),
-        (r#"{"ask":"tare"}"#, "unknown variant `tare`"),
+        (r#"{"ask":"step"}"#, "unknown variant `step`"),
+        (r#"{"ask":"tare"}"#, "`tare` has no effect while the task runs: send `stop` first"),
         (r#"{"ask":"get","patern":"*"}"#, "unknown field `patern`"),
         (
             r#"{"ask":"get","pattern":"pad.imag"}"#,

@@ -223,7 +223,10 @@ fn a_run_in_virtual_time_pauses_and_goes_on_at_a_word() {
     let pauses: Vec<&str> = out.lines().filter(|line| line.contains(" s, tick ")).collect();
     let times: Vec<&str> = pauses.iter().map(|line| line.split(' ').next().unwrap()).collect();
     assert_eq!(times, ["0.000", "0.500", "1.000", "1.200", "1.200"], "{out}");
-    assert!(pauses[0].contains("Enter: on to the next pause") && pauses[4].contains("`what` is no word here"), "{out}");
+    assert!(
+        pauses[0].contains("Enter or n: on to the next pause") && pauses[4].contains("`what` is no word here"),
+        "{out}"
+    );
     assert!(out.contains("mode servo for 0.2 s") && out.contains("limited by"), "{out}");
     assert!(out.contains("interrupted after 1.200 s and 301 ticks"), "{out}");
     let refused = crate::tool::say(&["run", "graphs/hybrid.toml", "--step", "--realtime"]);

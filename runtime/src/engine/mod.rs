@@ -10,6 +10,6 @@ pub(crate) use self::core::NodeRunner;
 pub use self::core::{Counters, ModeChange, Timing};
 pub use session::{
     Beginning, ChangeRequest, Changer, DisplayedPort, End, Engine, Halt, Interrupt, LateTick, LiveValue, Logged,
-    Outcome, Punctuality, Rest, RunOptions, ScheduledChanges, StopRequests, TaskEnd, TaskRun, TickUse, ValueChange,
-    Walk, block_io_signals, run, run_changing, run_virtual,
+    Outcome, Punctuality, Rest, RunOptions, RunRequests, ScheduledChanges, TareAnswer, TaskEnd, TaskRun, TickUse,
+    ValueChange, Walk, block_io_signals, run, run_changing, run_virtual,
 };

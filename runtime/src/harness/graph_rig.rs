@@ -169,6 +169,11 @@ impl GraphRig {
         self.engine.send(word).unwrap_or_else(|why| panic!("{why}"));
     }
 
+    /// Returns the engine that runs the graph.
+    pub const fn engine_mut(&mut self) -> &mut Engine {
+        &mut self.engine
+    }
+
     /// Returns the freshness of a port in the last tick.
     ///
     /// # Panics

@@ -119,6 +119,13 @@ pub trait AnyNode: Any + Send {
     }
     /// See [`Node::returned`].
     fn returned(&mut self) {}
+    /// See [`Node::can_tare`].
+    fn can_tare(&self, tick: &Tick, bus: &Bus, wires: &Wires) -> Option<Result<(), String>> {
+        let _ = (tick, bus, wires);
+        None
+    }
+    /// See [`Node::tare`].
+    fn tare(&mut self) {}
     /// See [`Node::uses`].
     fn uses(&self, wanted: &[Components]) -> Vec<Components> {
         let _ = wanted;
@@ -242,6 +249,14 @@ impl<N: Node> AnyNode for Cell<N> {
 
     fn returned(&mut self) {
         self.active.node.returned(&mut self.state);
+    }
+
+    fn can_tare(&self, tick: &Tick, bus: &Bus, wires: &Wires) -> Option<Result<(), String>> {
+        self.active.node.can_tare(N::Inputs::fetch(bus, wires, tick.index), &self.state)
+    }
+
+    fn tare(&mut self) {
+        self.active.node.tare(&mut self.state);
     }
 
     fn uses(&self, wanted: &[Components]) -> Vec<Components> {

@@ -154,6 +154,18 @@ pub trait Node: Describe + Sized + Send + 'static {
         let _ = state;
     }
 
+    /// Whether the operator may take the zero of the sensor behind the node anew, and why not; `None` for a node that
+    /// keeps no zero. The inputs are those of the last tick. It is called between two ticks, so it may allocate.
+    fn can_tare(&self, inputs: Self::Inputs<'_>, state: &Self::State) -> Option<Result<(), String>> {
+        let _ = (inputs, state);
+        None
+    }
+
+    /// Takes the zero anew, from the next samples on. It is called only after [`can_tare`](Self::can_tare) has agreed.
+    fn tare(&self, state: &mut Self::State) {
+        let _ = state;
+    }
+
     /// Runs one step. It must not block, allocate, log or read a clock. An output that it does not write becomes
     /// absent.
     fn step(&self, tick: &Tick, inputs: Self::Inputs<'_>, out: &mut Self::Outputs, state: &mut Self::State);

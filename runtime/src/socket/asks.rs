@@ -25,6 +25,8 @@ pub(crate) enum Ask {
         /// The word.
         word: String,
     },
+    /// Takes the zeros of the sensors anew.
+    Tare {},
     /// Sends the values of ports after each tick in which one of them has changed.
     Watch {
         /// Names and patterns.

@@ -13,7 +13,7 @@ use tokio::time::{sleep, timeout};
 use super::asks::WalkAnswer;
 use super::described::Described;
 use super::feed::{Content, FeedReader, Frame, Whole, Wishes};
-use crate::engine::{ChangeRequest, StopRequests, Walk};
+use crate::engine::{ChangeRequest, RunRequests, Walk};
 use crate::record::seconds_text;
 
 /// Interval at which the ring is read while something is wanted.
@@ -31,7 +31,7 @@ type WholeFrame = Rc<(Frame, Whole)>;
 /// What the clients share. All of them run on one thread.
 pub(super) struct Hub {
     pub(super) described: Described,
-    stops: Arc<StopRequests>,
+    stops: Arc<RunRequests>,
     changes: SyncSender<ChangeRequest>,
     wishes: Arc<Wishes>,
     reader: RefCell<FeedReader>,
@@ -66,7 +66,7 @@ impl Hub {
     pub(super) fn new(
         described: Described,
         (wishes, reader): (Arc<Wishes>, FeedReader),
-        stops: Arc<StopRequests>,
+        stops: Arc<RunRequests>,
         changes: SyncSender<ChangeRequest>,
     ) -> Self {
         Self {
@@ -204,6 +204,14 @@ impl Hub {
         } else {
             Err(self.described.refused(word, self.stops.words()))
         }
+    }
+
+    /// Takes the zeros of the sensors anew. Returns what does, or why nothing can.
+    pub(super) async fn tare(&self) -> Result<String, String> {
+        let (answer, answered) = oneshot::channel();
+        // Who waits no longer needs no answer.
+        self.stops.request_tare(Box::new(move |tared| drop(answer.send(tared))));
+        answered.await.unwrap_or_else(|_| Err("the run has ended".into()))
     }
 
     /// Adds a watcher. Returns its queue.

@@ -24,7 +24,7 @@ use super::feed::{Feed, FeedReader, Wishes, feed};
 use super::folder::bind;
 use super::hub::Hub;
 use super::lines::{Line, MAX_LINE, read_line};
-use crate::engine::{ChangeRequest, Engine, StopRequests};
+use crate::engine::{ChangeRequest, Engine, RunRequests};
 
 /// Maximum number of clients.
 const MAX_CLIENTS: usize = 64;
@@ -61,7 +61,7 @@ pub struct OpenedSocket {
     /// Gets every tick.
     pub feed: Feed,
     /// The stops that clients request.
-    pub stops: Arc<StopRequests>,
+    pub stops: Arc<RunRequests>,
     /// The changes that clients request.
     pub requests: Receiver<ChangeRequest>,
 }
@@ -71,7 +71,7 @@ struct Shared {
     listener: BlockingListener,
     facts: Described,
     ring: (Arc<Wishes>, FeedReader),
-    stops: Arc<StopRequests>,
+    stops: Arc<RunRequests>,
     changes: std::sync::mpsc::SyncSender<ChangeRequest>,
 }
 
@@ -83,7 +83,7 @@ pub fn open(engine: &Engine, facts: RunFacts) -> Result<OpenedSocket, String> {
     let (listener, path) = bind()?;
     let (feed, reader, wishes) = feed(engine);
     let (changes, requests) = sync_channel(MAX_CHANGES);
-    let stops = StopRequests::of(engine);
+    let stops = RunRequests::of(engine);
     let facts = Described::of(engine, facts);
     let shared = Shared { listener, facts, ring: (wishes, reader), stops: Arc::clone(&stops), changes };
     let (end, ended) = oneshot::channel();
@@ -216,6 +216,7 @@ async fn talk(read: OwnedReadHalf, write: &mut OwnedWriteHalf, hub: &Hub) -> io:
             }
             Ok(Ask::Set { values }) => answer(write, hub.set(values.into_iter().collect()).await).await?,
             Ok(Ask::Send { word }) => answer(write, hub.send(&word)).await?,
+            Ok(Ask::Tare {}) => answer(write, hub.tare().await).await?,
             Ok(Ask::Watch { ports, count }) => return watch(&ports, count, &mut reader, write, hub).await,
         }
         sleep(PAUSE).await;

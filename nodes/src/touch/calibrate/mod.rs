@@ -77,6 +77,9 @@ use tare::{Averages, Rules};
 /// presses on one tactel for long is felt. A pad that was lost and comes back, where the bench says `reconnect`, is
 /// tested again, with the calibrated zeros.
 ///
+/// The operator takes the zeros anew with the word `tare`, while the task is halted: the self-test is repeated. It is
+/// refused while a reading is farther than `tare_bound` from its zero, because something touches the pad.
+///
 /// ```toml
 /// [nodes.calibrate]
 /// type = "calibrate"
@@ -266,6 +269,15 @@ impl Node for Calibrate {
         self.rules.iter().for_each(|rules| rules.restart(&mut state.averages));
     }
 
+    fn can_tare(&self, inputs: Inputs<'_>, state: &State) -> Option<Result<(), String>> {
+        self.test.as_ref().map(|test| self.is_free(test, &inputs, state))
+    }
+
+    fn tare(&self, state: &mut State) {
+        self.returned(state);
+        state.sinking = Sinking::default();
+    }
+
     fn step(&self, tick: &Tick, inputs: Inputs<'_>, out: &mut Outputs, state: &mut State) {
         out.failed.keep();
         out.bad.keep();
@@ -310,6 +322,27 @@ impl Node for Calibrate {
 }
 
 impl Calibrate {
+    /// Checks that nothing touches the pad, as far as its zeros show it.
+    fn is_free(&self, test: &RestTest, inputs: &Inputs<'_>, state: &State) -> Result<(), String> {
+        if state.rest.verdict != Verdict::Passed {
+            return Err("the self-test of the pad is not over".into());
+        }
+        let bound = test.bound.ok_or("without `tare_bound`, nothing tells whether something touches the pad")?;
+        let image = inputs.image.as_ref().ok_or("the pad sends no image")?;
+        let off = |i: usize| f64::from(image.cells()[i] - state.offset[i]).abs();
+        let live = (0..image.cells().len()).filter(|i| !self.curves.is_dead(*i));
+        let (count, most) =
+            live.map(off).filter(|off| *off > bound).fold((0, 0.0), |(n, most), off| (n + 1, off.max(most)));
+        if count == 0 {
+            return Ok(());
+        }
+        let unit = &self.unit;
+        Err(format!(
+            "something touches the pad: {count} tactels are off their zeros by up to {most:.4} {unit}, and {bound} {unit} is \
+             allowed; free the pad"
+        ))
+    }
+
     /// Adds a frame to the self-test, and writes what it has found once it is over. Returns whether the pad has passed.
     #[cold]
     fn passes(&self, image: &In<'_, Image>, out: &mut Outputs, state: &mut State) -> bool {

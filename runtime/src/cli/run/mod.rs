@@ -138,6 +138,27 @@ pub struct JobOptions {
     pub hides_out: bool,
 }
 
+impl JobOptions {
+    /// Checks the options that hold only in real time, or only in virtual time.
+    fn check_time(&self, is_real: bool) -> Result<(), String> {
+        if self.listen && !is_real {
+            return Err("`--listen` requires real time: add `--realtime`, or send words with `--send 2s:resume`".into());
+        }
+        if self.step.is_some() && is_real {
+            let why = "a run in real time cannot pause; `stop` brings an arm to rest";
+            return Err(format!("`--step` requires virtual time: {why}"));
+        }
+        Ok(())
+    }
+
+    /// Returns the options of the engine.
+    fn of_run(&self) -> RunOptions {
+        let Self { duration, realtime, send, listen, .. } = self;
+        let (duration, is_realtime, sends, listens) = (*duration, *realtime, send.clone(), *listen);
+        RunOptions { duration, is_realtime, sends, listens, ..RunOptions::default() }
+    }
+}
+
 /// What a run prints.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Print {
@@ -182,13 +203,9 @@ impl Job {
     fn run_plan(&self, plan: Compiled, request: &Request, shell: &Shell) -> Result<u8, String> {
         plan.warnings().iter().for_each(|report| shell.show(report));
         let interrupt = Arc::new(Interrupt::catch().map_err(|error| format!("cannot run: {error}"))?);
-        let JobOptions { duration, realtime, send, listen, points, .. } = &self.options;
-        let is_real = *realtime || plan.is_live();
-        if *listen && !is_real {
-            return Err("`--listen` requires real time: add `--realtime`, or send words with `--send 2s:resume`".into());
-        }
-        stepping::check(self.options.step, is_real)?;
-        let chosen = points.as_ref().map(|wanted| wanted.resolve(&plan)).transpose()?;
+        let is_real = self.options.realtime || plan.is_live();
+        self.options.check_time(is_real)?;
+        let chosen = self.options.points.as_ref().map(|wanted| wanted.resolve(&plan)).transpose()?;
         let mut warnings = plan.warnings().into_iter().flat_map(|report| report.diagnostics);
         let start = warnings.find(|warning| warning.code == Code::StartOutside).map(|warning| warning.message);
         let silences = plan.silences().to_vec();
@@ -217,12 +234,10 @@ impl Job {
         shell.begin_log();
         let mut summary = Summary::new(&engine, self.print == Print::Ports, start);
         let mut log = NodeLog::new(&engine);
-        let end = duration.or_else(|| engine.end().map(seconds));
+        let end = self.options.duration.or_else(|| engine.end().map(seconds));
         let terminal = Some(shell.err()).filter(|_| self.print != Print::Nothing);
         let mut progress = Progress::new(end, terminal, shell.has_colour_on_stderr());
-        let (sends, listens) = (send.clone(), *listen);
-        let mut options =
-            RunOptions { duration: *duration, is_realtime: *realtime, sends, listens, ..RunOptions::default() };
+        let mut options = self.options.of_run();
         let mut stepping = Stepping::of(self.options.step, &mut options, &interrupt)?;
         let Outside { mut changes, mut socket } = Outside::open(changes, facts, &engine, &mut options, shell);
         let outcome = without_panic_messages(|| {
@@ -296,7 +311,7 @@ impl Job {
 
     /// Checks that the graph or the runtime knows every word that is sent.
     fn check_words(&self, engine: &Engine) -> Result<(), String> {
-        let is_own = |word: &str| ["stop", "resume"].iter().any(|own| word.eq_ignore_ascii_case(own));
+        let is_own = |word: &str| ["stop", "resume", "tare"].iter().any(|own| word.eq_ignore_ascii_case(own));
         let words = engine.words();
         let is_unknown = |word: &str| !is_own(word) && words.iter().all(|known| known != word);
         let Some((_, word)) = self.options.send.iter().find(|(_, word)| is_unknown(word)) else { return Ok(()) };
@@ -315,7 +330,6 @@ fn endless_stop(engine: &Engine, fault: &Fault) -> &'static str {
     }
 }
 
-/// Describes how a run ended, and its speed.
 /// Writes what a paused run does, and what may be typed.
 fn paused(engine: &Engine, summary: &Summary, has_colour: bool, words: &str) -> String {
     let state = summary.live(engine, PageStyle::new(has_colour)).join("\n");
@@ -323,6 +337,7 @@ fn paused(engine: &Engine, summary: &Summary, has_colour: bool, words: &str) -> 
     format!("{}\n{}", state.trim_end(), line.trim_end_matches([':', ' ']))
 }
 
+/// Describes how a run ended, and its speed.
 fn ending(outcome: &Outcome) -> String {
     let interrupted = outcome.signal.map(|signal| format!("interrupted by {signal}"));
     let reason = match outcome.end {

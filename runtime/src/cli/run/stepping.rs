@@ -10,22 +10,10 @@ use super::time::duration;
 use crate::engine::{Interrupt, RunOptions};
 
 /// What may be typed.
-const WORDS: &str = "Enter: on to the next pause; a time such as 100ms: on for it; c: on without a pause; p: pause; \
-                     q: end the run";
+const WORDS: &str = "Enter or n: on to the next pause; a time such as 100ms: on for it; c: on without a pause; p: pause, or \
+                     on; q: end the run";
 /// Interval at which a paused run looks for a signal.
 const LOOK: Duration = Duration::from_millis(50);
-
-/// Checks that a run can pause.
-///
-/// # Errors
-/// If something moves while it does.
-pub(super) fn check(step: Option<Option<f64>>, is_real: bool) -> Result<(), String> {
-    if step.is_some() && is_real {
-        let why = "a run in real time cannot pause; `stop` brings an arm to rest";
-        return Err(format!("`--step` requires virtual time: {why}"));
-    }
-    Ok(())
-}
 
 /// When a run pauses.
 pub(super) struct Stepping {
@@ -102,9 +90,9 @@ impl Stepping {
         // The next pause is at the first tick that is not before it.
         let after = |time: f64| now + time.max(f64::EPSILON * now.max(1.0));
         match word.trim() {
-            "" => self.next = after(self.every),
+            "" | "n" => self.next = after(self.every),
             "c" => self.next = f64::INFINITY,
-            "p" => self.next = now,
+            "p" => self.next = if now < self.next { now } else { f64::INFINITY },
             "q" => self.end.store(true, Ordering::Relaxed),
             time => match duration(time) {
                 Ok(time) => self.next = after(time),
@@ -142,6 +130,7 @@ mod tests {
         assert_eq!(pauses(0.0, &["", "", ""]), (vec![1, 2, 3, 4], false));
         assert_eq!(pauses(0.1, &["", ""]), (vec![1, 26, 51], false));
         assert_eq!(pauses(0.0, &["1s", "p", "q"]), (vec![1, 2], true));
+        assert_eq!(pauses(0.0, &["n", "p"]), (vec![1, 2], false));
         assert_eq!(pauses(0.0, &["40ms", "q"]), (vec![1, 11], true));
         assert_eq!(pauses(0.0, &["c"]), (vec![1], false));
         assert_eq!(pauses(0.0, &["what", "q"]).0[..2], [1, 1], "it says what it knows, and waits");

@@ -1,10 +1,11 @@
-//! The commands for graphs that run in other processes of the same user: `ps`, `get`, `set`, `send` and `watch`.
+//! The commands for graphs that run in other processes of the same user: `ps`, `get`, `set`, `send`, `tare` and `watch`.
 
 mod get;
 mod ps;
 mod save;
 mod send;
 mod set;
+mod tare;
 mod watch;
 
 use std::path::{Path, PathBuf};
@@ -14,8 +15,15 @@ use super::text::number::count_of;
 use crate::socket::{About, Ask, Client, sockets};
 
 /// Returns the commands.
-pub(super) fn commands() -> [Subcommand; 5] {
-    [derived(ps::ps), derived(get::get), derived(set::set), derived(send::send), derived(watch::watch)]
+pub(super) fn commands() -> [Subcommand; 6] {
+    [
+        derived(ps::ps),
+        derived(get::get),
+        derived(set::set),
+        derived(send::send),
+        derived(tare::tare),
+        derived(watch::watch),
+    ]
 }
 
 /// Which run is meant.

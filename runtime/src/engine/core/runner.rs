@@ -208,6 +208,16 @@ impl NodeRunner {
         matches!(self.state, RunState::Panicked(_))
     }
 
+    /// Whether the node can take its zero anew, by its inputs as of the last tick; `None` if it keeps none.
+    pub(crate) fn can_tare(&self, tick: &Tick, bus: &Bus) -> Option<Result<(), String>> {
+        self.node.can_tare(tick, bus, &self.wires)
+    }
+
+    /// Makes the node take its zero anew.
+    pub(crate) fn tare(&mut self) {
+        self.node.tare();
+    }
+
     /// Resets the state of the node.
     pub(crate) fn reset(&mut self) {
         self.node.reset();

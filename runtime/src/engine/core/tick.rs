@@ -182,6 +182,18 @@ impl Core {
         self.runners[runner].exchange(other);
     }
 
+    /// Whether the runner with that index can take its zero anew; `None` if it keeps none.
+    #[cold]
+    pub(crate) fn can_tare(&self, runner: usize) -> Option<Result<(), String>> {
+        self.runners[runner].can_tare(&self.tick, &self.bus)
+    }
+
+    /// Makes the runner with that index take its zero anew.
+    #[cold]
+    pub(crate) fn tare(&mut self, runner: usize) {
+        self.runners[runner].tare();
+    }
+
     /// Resets the runner with that index.
     pub(crate) fn reset(&mut self, runner: usize) {
         self.runners[runner].reset();

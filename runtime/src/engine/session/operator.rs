@@ -7,7 +7,7 @@ use std::sync::Arc;
 use super::engine::Engine;
 use super::line_reader::{LineReader, stops};
 use super::outcome::RunOptions;
-use super::stop_requests::StopRequests;
+use super::run_requests::RunRequests;
 use super::task_run::TaskRun;
 
 /// Maximum number of words from the standard input that one tick carries out.
@@ -22,7 +22,7 @@ pub(crate) struct OperatorInput {
     /// The standard input; `None` if it is not read or has ended.
     reader: Option<LineReader>,
     /// Stops that other threads request.
-    stops: Option<Arc<StopRequests>>,
+    stops: Option<Arc<RunRequests>>,
     warnings: Warnings,
 }
 

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 use std::time::Duration;
 
-use super::stop_requests::StopRequests;
+use super::run_requests::RunRequests;
 use crate::fault::Fault;
 
 /// Options of a run.
@@ -23,7 +23,7 @@ pub struct RunOptions {
     /// Ends the run as Ctrl-C does, once somebody sets it.
     pub cancel: Option<Arc<AtomicBool>>,
     /// Stops that other threads request.
-    pub stops: Option<Arc<StopRequests>>,
+    pub stops: Option<Arc<RunRequests>>,
 }
 
 /// Why a run ended.

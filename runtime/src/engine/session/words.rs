@@ -1,6 +1,7 @@
 //! What an operator word does: which tasks it reaches, and why a task refuses it.
 
 use super::engine::Engine;
+use super::tare::TARE;
 use super::task_run::TaskRun;
 use super::trouble::Trouble;
 use crate::graph::Policy;
@@ -18,8 +19,8 @@ enum Effect {
 const STOPPED: &str = "has no effect while the commands are stopped: send `resume` first";
 
 impl Engine {
-    /// Sends an operator word. `stop` halts the commands and `resume` ends the halt, in upper or lower case; other
-    /// words go to the modes. A bare word reaches all tasks, and `left.stop` only the task `left` and those in it.
+    /// Sends an operator word. `stop` halts the commands, `resume` ends the halt, and `tare` takes the zeros of the sensors
+    /// anew, in upper or lower case; other words go to the modes. A bare word reaches all tasks, and `left.stop` only the task `left` and those in it.
     ///
     /// A `stop` takes effect in the next tick. It voids every word before that tick, sent before it or after it.
     ///
@@ -27,6 +28,9 @@ impl Engine {
     /// Returns a message if no mode has a condition on the word, if the commands wait for `resume`, or if the trouble
     /// that stopped them is not over at `resume`.
     pub fn send(&mut self, word: &str) -> Result<(), String> {
+        if word.eq_ignore_ascii_case(TARE) && !self.tasks.iter().any(|task| task.words().any(|known| known == word)) {
+            return self.tare().map(drop);
+        }
         if let Some(log) = &mut self.inputs {
             log.word(word);
         }
@@ -131,6 +135,7 @@ impl Engine {
         for task in self.tasks.iter().skip(1) {
             words.extend(own().chain(task.words()).map(|word| format!("{}.{word}", task.name())));
         }
+        words.push(TARE.to_owned());
         words.sort();
         words.dedup();
         words
