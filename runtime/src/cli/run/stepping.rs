@@ -131,7 +131,9 @@ mod tests {
         assert_eq!(pauses(0.1, &["", ""]), (vec![1, 26, 51], false));
         assert_eq!(pauses(0.0, &["1s", "p", "q"]), (vec![1, 2], true));
         assert_eq!(pauses(0.0, &["n", "p"]), (vec![1, 2], false));
-        assert_eq!(pauses(0.0, &["40ms", "q"]), (vec![1, 11], true));
+        assert_eq!(pauses(0.0, &["42ms", "n", "q"]), (vec![1, 12, 13], true));
+        // It ends a run that goes on, too.
+        assert_eq!(pauses(0.0, &["42ms", "q"]), (vec![1], true));
         assert_eq!(pauses(0.0, &["c"]), (vec![1], false));
         assert_eq!(pauses(0.0, &["what", "q"]).0[..2], [1, 1], "it says what it knows, and waits");
     }
