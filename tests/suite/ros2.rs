@@ -235,8 +235,9 @@ fn assert_says(domain: u32, settings: Value, word: Option<&str>, expected: &str)
     let text = end(child);
     assert!(text.contains(expected), "{settings} {word:?}: {text}");
     assert!(begin.elapsed() < SOON, "{settings} {word:?}: it takes {:?}", begin.elapsed());
-    let from = robot.now();
-    sleep(Duration::from_millis(300));
+    // The last trajectory ends at rest.
+    let from = robot.now() + REST;
+    sleep(Duration::from_secs_f64(REST + 0.3));
     assert!(robot.speed(from) < STILL, "{settings} {word:?}: the arm moves");
 }
 

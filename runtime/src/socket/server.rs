@@ -156,18 +156,17 @@ async fn accept(listener: &UnixListener, hub: &Rc<Hub>, places: &[Arc<Semaphore>
         if !is_own {
             continue;
         }
-        let [place, to_stop] = places.each_ref().map(|places| Arc::clone(places).try_acquire_owned());
+        let [place, to_stop] = places.each_ref().map(Arc::clone);
+        let place = place.try_acquire_owned();
+        let to_stop = place.is_err().then(|| to_stop.try_acquire_owned());
         let hub = Rc::clone(hub);
         tokio::task::spawn_local(async move {
             let (read, mut write) = stream.into_split();
             // A client that has gone needs no answer.
             let _ = match (place, to_stop) {
-                (Ok(_place), unused) => {
-                    drop(unused);
-                    talk(read, &mut write, &hub).await
-                }
-                (Err(_), Ok(_place)) => stop(read, &mut write, &hub).await,
-                (Err(_), Err(_)) => answer::<()>(&mut write, Err(full())).await,
+                (Ok(_place), _) => talk(read, &mut write, &hub).await,
+                (Err(_), Some(Ok(_place))) => stop(read, &mut write, &hub).await,
+                (Err(_), _) => answer::<()>(&mut write, Err(full())).await,
             };
         });
     }

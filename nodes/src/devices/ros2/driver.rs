@@ -106,6 +106,8 @@ struct Session {
     has_ended: bool,
     /// Whether the arm has stopped by itself since the last joint state.
     has_stopped: bool,
+    /// When an arm that stops by itself is at rest.
+    rests_from: Instant,
 }
 
 impl Session {
@@ -129,6 +131,7 @@ impl Session {
             is_first: true,
             has_ended: true,
             has_stopped: false,
+            rests_from: now,
             arm,
             domain,
             output,
@@ -180,9 +183,12 @@ impl Session {
         if stamp != 0 {
             self.agreement.hear(now, wall_clock(), stamp);
         }
-        if self.heard.is_none() || self.is_lost || self.has_stopped {
-            self.follow_measured(f64::EPSILON);
+        // An arm that stops by itself takes its time.
+        if self.has_stopped && now >= self.rests_from {
             self.has_stopped = false;
+        }
+        if self.course.rests() && !self.has_stopped && !matches!(self.phase, Phase::Ready { .. }) {
+            self.course.reference.copy_from_slice(&self.position);
         }
         self.heard = Some((now, writer));
         (self.is_lost, self.bad, self.number) = (false, None, self.number + 1);
@@ -197,14 +203,6 @@ impl Session {
         link.publish(|samples| {
             ports.write_with_safety(samples, stamp, number, [&self.position, equilibrium], is_ready);
         });
-    }
-
-    /// Takes the measured posture as the commanded one, if a joint is farther away than `bound` [rad].
-    fn follow_measured(&mut self, bound: f64) {
-        let far = self.course.reference.iter().zip(&self.position).any(|(reference, q)| (reference - q).abs() > bound);
-        if far {
-            self.course.reference.copy_from_slice(&self.position);
-        }
     }
 
     /// Looks who else is on the topics.
@@ -223,11 +221,23 @@ impl Session {
             return Some(format!("two programs publish our joints on `{states}`"));
         }
         if self.output.ends_at_rest()
-            && let Some(why) = self.agreement.why_not(states)
+            && let Some(why) = self.agreement.why_not(states).or_else(|| self.why_astray())
         {
             return Some(why);
         }
         self.topics.clone()
+    }
+
+    /// Says which joint does not follow: a controller that is not active takes messages, and moves nothing.
+    fn why_astray(&self) -> Option<String> {
+        let bound = self.arm.start.deflection();
+        let joints = self.arm.names.iter().zip(self.course.reference.iter().zip(&self.position));
+        let is_following = matches!(self.phase, Phase::Ready { .. });
+        let (name, (to, at)) = joints.filter(|_| is_following).find(|(_, (to, at))| (*to - *at).abs() > bound)?;
+        Some(format!(
+            "joint `{name}` is at {at:.4} rad, and is commanded to {to:.4} rad: they differ by more than {bound} rad. Check \
+             that the controller is active and can move the arm, or raise `start_bounds.deflection`"
+        ))
     }
 
     /// Decides whether the arm may move.
@@ -260,7 +270,6 @@ impl Session {
         if !self.course.rests() {
             return Ok(());
         }
-        self.follow_measured(self.arm.start.deflection());
         let report = StartReport {
             measured: &self.position,
             commanded: &self.course.reference,
@@ -285,6 +294,7 @@ impl Session {
         if is_too_long && !self.course.rests() {
             self.course.halt();
             (self.has_ended, self.has_stopped) = (true, true);
+            self.rests_from = Instant::now() + Duration::from_secs_f64(self.arm.commanded.silence);
             self.phase = Phase::Waiting { since: Instant::now() };
         }
         if link.is_mute() || self.has_stopped {
@@ -301,8 +311,9 @@ impl Session {
         // At rest, an arm that follows trajectories needs no more; one that follows velocities is told so.
         let is_due = !(rests && self.has_ended) || is_checked && !self.output.ends_at_rest();
         if is_due {
-            self.has_ended = rests;
-            if !self.output.say(&self.course, &self.arm.names, made) {
+            let is_sent = self.output.say(&self.course, &self.arm.names, made);
+            self.has_ended = rests && is_sent;
+            if !is_sent {
                 link.count("commands that were not sent");
             }
         }

@@ -78,7 +78,8 @@ use tare::{Averages, Rules};
 /// tested again, with the calibrated zeros.
 ///
 /// The operator takes the zeros anew with the word `tare`, while the task is halted: the self-test is repeated. It is
-/// refused while a reading is farther than `tare_bound` from its zero, because something touches the pad.
+/// refused while a reading is off its zero by more than eight times the noise, because something may touch the pad. A
+/// touch during the self-test ends the task, as at the start.
 ///
 /// ```toml
 /// [nodes.calibrate]
@@ -147,6 +148,11 @@ pub struct Params {
     #[param(unit = "U", above = 0.0)]
     max_rise: Option<f64>,
 }
+
+/// A reading that is off its zero by that many times the noise is no noise.
+const FREE: f64 = 8.0;
+/// The same for a pad without noise, as a fraction of its `tare_bound`.
+const MIN_FREE: f64 = 0.1;
 
 /// What `calibrate` reads.
 #[derive(Inputs)]
@@ -322,24 +328,26 @@ impl Node for Calibrate {
 }
 
 impl Calibrate {
-    /// Checks that nothing touches the pad, as far as its zeros show it.
+    /// Checks that nothing touches the pad: no reading is off its zero by more than noise, and the self-test would accept
+    /// it as the new zero.
     fn is_free(&self, test: &RestTest, inputs: &Inputs<'_>, state: &State) -> Result<(), String> {
         if state.rest.verdict != Verdict::Passed {
             return Err("the self-test of the pad is not over".into());
         }
-        let bound = test.bound.ok_or("without `tare_bound`, nothing tells whether something touches the pad")?;
+        let bound = test.bound.ok_or("the pad has no `tare_bound`, so a touch cannot be distinguished from a drift")?;
         let image = inputs.image.as_ref().ok_or("the pad sends no image")?;
-        let off = |i: usize| f64::from(image.cells()[i] - state.offset[i]).abs();
-        let live = (0..image.cells().len()).filter(|i| !self.curves.is_dead(*i));
-        let (count, most) =
-            live.map(off).filter(|off| *off > bound).fold((0, 0.0), |(n, most), off| (n + 1, off.max(most)));
-        if count == 0 {
+        let near = (FREE * state.rest.noise).max(MIN_FREE * bound).min(bound / 2.0);
+        let off = |i: usize, zero: &[f32]| f64::from(image.cells()[i] - zero[i]).abs();
+        let is_touched = |i: &usize| off(*i, &state.offset) > near || off(*i, &self.offset) > bound - near;
+        let touched = (0..image.cells().len()).filter(|i| !self.curves.is_dead(*i)).filter(is_touched);
+        let (count, most) = touched.fold((0, 0.0), |(count, most), i| (count + 1, off(i, &state.offset).max(most)));
+        if count == 0 && inputs.present.is_none_or(|present| !*present) {
             return Ok(());
         }
         let unit = &self.unit;
         Err(format!(
-            "something touches the pad: {count} tactels are off their zeros by up to {most:.4} {unit}, and {bound} {unit} is \
-             allowed; free the pad"
+            "something touches the pad, or its zero has drifted too far: {count} tactels are off by up to {most:.1} {unit}, \
+             and {near:.1} {unit} is allowed; free the pad, or start the run again"
         ))
     }
 

@@ -65,6 +65,8 @@ impl Stepping {
             // Any other word is for the next pause.
             if let Some(word) = self.ahead.take_if(|word| ["p", "q"].contains(&word.trim())) {
                 self.take(&word, now, &mut show);
+            } else if self.next == f64::INFINITY {
+                self.ahead = None;
             }
         }
         if now >= self.next {
@@ -135,6 +137,7 @@ mod tests {
         // It ends a run that goes on, too.
         assert_eq!(pauses(0.0, &["42ms", "q"]), (vec![1], true));
         assert_eq!(pauses(0.0, &["c"]), (vec![1], false));
+        assert_eq!(pauses(0.0, &["c", "", "q"]), (vec![1], true));
         assert_eq!(pauses(0.0, &["what", "q"]).0[..2], [1, 1], "it says what it knows, and waits");
     }
 }

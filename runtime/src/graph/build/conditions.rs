@@ -338,8 +338,8 @@ fn sent_condition(word: &Spanned<String>) -> Resolved<(Condition, String)> {
         )
         .into_err();
     }
-    if ["stop", "resume"].contains(&word.value.as_str()) {
-        let help = "`stop` halts the run and `resume` continues it: choose another word";
+    if ["stop", "resume", "tare"].contains(&word.value.as_str()) {
+        let help = "`stop` halts the run, `resume` continues it, and `tare` takes the zeros of its sensors anew: choose another word";
         return bad_condition(&word.span, format!("the word `{}` is reserved", word.value)).help(help).into_err();
     }
     Ok((Condition::Sent(word.value.clone()), format!("`{}` was sent", word.value)))
