@@ -132,7 +132,8 @@ impl Catalogue {
         self
     }
 
-    /// States device types that this build leaves out: `how` says how to get them. A graph that uses one is told so.
+    /// States device types that this build leaves out. `how` says how to get them, in the message about a graph that uses
+    /// one.
     pub fn left_out(mut self, names: &[&'static str], how: &'static str) -> Self {
         self.left_out.extend(names.iter().map(|name| (*name, how)));
         self

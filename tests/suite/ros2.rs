@@ -58,7 +58,7 @@ impl Robot {
     fn tell(&mut self, word: &str) {
         let from = self.process.count();
         self.process.say(word);
-        self.process.wait(from, |event| event["told"] == word);
+        self.process.wait(from, |event| event["heard"] == word);
     }
 
     /// The largest speed of a joint from a moment on [s, wall clock], [rad/s].

@@ -259,7 +259,7 @@ fn a_stop_needs_no_place() {
         (session.say(&["get", KP]).code != 0).then_some(())
     };
     wait_for(is_full, "refusal");
-    // Those without a place are told so, and gone, after a moment.
+    // A client without a place gets a message, and its connection is closed after a moment.
     let stopped = wait_for(|| Some(session.say(&["send", "stop"])).filter(|said| said.code == 0), "place for a stop");
     assert!(stopped.out.contains("stop"), "{}", stopped.out);
     let end = finish(session.runs.remove(0));

@@ -66,12 +66,6 @@ impl StartCheck {
         Self { chain, bounds, start }
     }
 
-    /// Returns the maximum difference between the measured and the commanded position of a joint [rad].
-    #[cfg(feature = "ros2")]
-    pub(crate) const fn deflection(&self) -> f64 {
-        self.bounds.deflection
-    }
-
     /// Checks a report. Call it before the first command, and again before the first command after the controller was
     /// not commanded for a while.
     ///

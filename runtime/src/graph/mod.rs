@@ -34,4 +34,4 @@ pub(crate) use plan::{
     PlannedRole, PlannedShow, PlannedTask, PlannedView, PlannedWire, PortRef, Producer, Reach, Test,
 };
 pub use syntax::Policy;
-pub(crate) use syntax::{AgeLimit, ExitKind, PolicyTable, PortState, into_diagnostic};
+pub(crate) use syntax::{AgeLimit, ExitKind, PolicyTable, PortState, WORDS, into_diagnostic};

@@ -31,7 +31,7 @@ type WholeFrame = Rc<(Frame, Whole)>;
 /// What the clients share. All of them run on one thread.
 pub(super) struct Hub {
     pub(super) described: Described,
-    stops: Arc<RunRequests>,
+    requests: Arc<RunRequests>,
     changes: SyncSender<ChangeRequest>,
     wishes: Arc<Wishes>,
     reader: RefCell<FeedReader>,
@@ -66,12 +66,12 @@ impl Hub {
     pub(super) fn new(
         described: Described,
         (wishes, reader): (Arc<Wishes>, FeedReader),
-        stops: Arc<RunRequests>,
+        requests: Arc<RunRequests>,
         changes: SyncSender<ChangeRequest>,
     ) -> Self {
         Self {
             described,
-            stops,
+            requests,
             changes,
             wishes,
             reader: RefCell::new(reader),
@@ -199,10 +199,10 @@ impl Hub {
 
     /// Sends a word, if it stops.
     pub(super) fn send(&self, word: &str) -> Result<String, String> {
-        if self.stops.request(word) {
+        if self.requests.request(word) {
             Ok(self.described.stopped(word))
         } else {
-            Err(self.described.refused(word, self.stops.words()))
+            Err(self.described.refused(word, self.requests.words()))
         }
     }
 
@@ -210,7 +210,7 @@ impl Hub {
     pub(super) async fn tare(&self) -> Result<String, String> {
         let (answer, answered) = oneshot::channel();
         // Who waits no longer needs no answer.
-        self.stops.request_tare(Box::new(move |tared| drop(answer.send(tared))));
+        self.requests.request_tare(Box::new(move |tared| drop(answer.send(tared))));
         answered.await.unwrap_or_else(|_| Err("the run has ended".into()))
     }
 

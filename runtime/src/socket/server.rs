@@ -60,10 +60,10 @@ pub struct OpenedSocket {
     pub socket: RunSocket,
     /// Gets every tick.
     pub feed: Feed,
-    /// The stops that clients request.
-    pub stops: Arc<RunRequests>,
+    /// The stops and tares that clients request.
+    pub requests: Arc<RunRequests>,
     /// The changes that clients request.
-    pub requests: Receiver<ChangeRequest>,
+    pub changes: Receiver<ChangeRequest>,
 }
 
 /// What the thread works with.
@@ -71,7 +71,7 @@ struct Shared {
     listener: BlockingListener,
     facts: Described,
     ring: (Arc<Wishes>, FeedReader),
-    stops: Arc<RunRequests>,
+    requests: Arc<RunRequests>,
     changes: std::sync::mpsc::SyncSender<ChangeRequest>,
 }
 
@@ -82,10 +82,11 @@ struct Shared {
 pub fn open(engine: &Engine, facts: RunFacts) -> Result<OpenedSocket, String> {
     let (listener, path) = bind()?;
     let (feed, reader, wishes) = feed(engine);
-    let (changes, requests) = sync_channel(MAX_CHANGES);
-    let stops = RunRequests::of(engine);
+    let (requested, changes) = sync_channel(MAX_CHANGES);
+    let requests = RunRequests::of(engine);
     let facts = Described::of(engine, facts);
-    let shared = Shared { listener, facts, ring: (wishes, reader), stops: Arc::clone(&stops), changes };
+    let shared =
+        Shared { listener, facts, ring: (wishes, reader), requests: Arc::clone(&requests), changes: requested };
     let (end, ended) = oneshot::channel();
     let work = move || {
         if let Err(error) = serve(shared, ended) {
@@ -96,7 +97,7 @@ pub fn open(engine: &Engine, facts: RunFacts) -> Result<OpenedSocket, String> {
     // From here on, the file is removed at the end.
     let mut socket = RunSocket { thread: None, end: Some(end), path };
     socket.thread = Some(thread.map_err(|error| format!("cannot start a thread: {error}"))?);
-    Ok(OpenedSocket { socket, feed, stops, requests })
+    Ok(OpenedSocket { socket, feed, requests, changes })
 }
 
 impl RunSocket {
@@ -124,7 +125,7 @@ fn serve(shared: Shared, over: oneshot::Receiver<()>) -> io::Result<()> {
     let runtime = tokio::runtime::Builder::new_current_thread().enable_io().enable_time().build()?;
     LocalSet::new().block_on(&runtime, async move {
         let listener = UnixListener::from_std(shared.listener)?;
-        let hub = Rc::new(Hub::new(shared.facts, shared.ring, shared.stops, shared.changes));
+        let hub = Rc::new(Hub::new(shared.facts, shared.ring, shared.requests, shared.changes));
         let worker = Rc::clone(&hub);
         tokio::task::spawn_local(async move { worker.work().await });
         let places = [MAX_CLIENTS, MAX_STOPPING].map(|places| Arc::new(Semaphore::new(places)));

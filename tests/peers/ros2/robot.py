@@ -2,15 +2,15 @@
 
     python3 robot.py '{"domain": 7, "urdf": "graphs/robots/lwr4p.urdf"}'
 
-The arm is stiff and follows its controller with a lag. The controller is that of `joint_trajectory_controller`, or one
-that follows velocities and stops after 100 ms without one. A trajectory starts at its stamp; one that has ended before it
-arrives is refused. The pad is an elastic foundation: each tactel is a spring that a ball at a fixed place in the base
-presses. Friction, the weight of the arm and the flexibility of its joints are left out.
+The arm is stiff and follows its controller with a lag. The controller is that of `joint_trajectory_controller`, or
+one that follows velocities and stops after 100 ms without one. A trajectory starts at its stamp. One that has ended
+before it arrives is refused. The pad is an elastic foundation: each tactel is a spring that a ball at a fixed place
+in the base presses. Friction, the weight of the arm and the flexibility of its joints are left out.
 
-It prints a line of JSON every 20 ms: its wall clock, joints, their largest speed since the last line, the force, how many
-commands it has taken and refused, and how old those since the last line were when they came. It
-reads words: `quiet` and `talk` (the joint states), `blind` and `see` (the image), `second` (another publisher of commands),
-`twin` (another publisher of joints), `nan` (the position of a joint), `hang SECONDS`.
+It prints a line of JSON every 20 ms: its wall clock, joints, their largest speed since the last line, the force, how
+many commands it has taken and refused, and how old those since the last line were when they came. It reads words:
+`quiet` and `talk` (the joint states), `blind` and `see` (the image), `second` (another publisher of commands), `twin`
+(another publisher of joints), `nan` (the position of a joint).
 """
 
 import json
@@ -106,10 +106,9 @@ class Controller:
         """Takes a trajectory as `joint_trajectory_controller` does."""
         order = [message.joint_names.index(name) for name in names]
         begin = message.header.stamp.seconds() or now
-        points = [
-            (begin + point.time_from_start.seconds(), np.array(point.positions)[order], np.array(point.velocities)[order])
-            for point in message.points
-        ]
+        arrays = [(np.array(point.positions)[order], np.array(point.velocities)[order]) for point in message.points]
+        times = [begin + point.time_from_start.seconds() for point in message.points]
+        points = [(at, *posture) for at, posture in zip(times, arrays)]
         self.ages.append(now - begin)
         if points[-1][0] < now:
             self.refused += 1
@@ -159,14 +158,14 @@ class Robot:
         best_effort = Qos(Policy.Reliability.BestEffort, Policy.History.KeepLast(1))
         reliable = Qos(RELIABLE, Policy.History.KeepLast(1))
         state_type = getattr(ros, SETTINGS["state_type"])
-        self.states = DataWriter(self.participant, topic(self.participant, "/joint_states", state_type), qos=best_effort)
+        self.states = self.writer("/joint_states", state_type, best_effort)
         self.twin = None
         pads = {"image": ros.Image, "array": ros.Float32MultiArray, "tactile_state": ros.TactileState}
         self.pad = None
         if SETTINGS["pad"]:
-            self.pad = DataWriter(self.participant, topic(self.participant, "/tactile", pads[SETTINGS["pad"]]), qos=best_effort)
+            self.pad = self.writer("/tactile", pads[SETTINGS["pad"]], best_effort)
         self.wrench_type = getattr(ros, SETTINGS["wrench_type"])
-        self.wrench = DataWriter(self.participant, topic(self.participant, "/wrench", self.wrench_type), qos=best_effort)
+        self.wrench = self.writer("/wrench", self.wrench_type, best_effort)
         kinds = {"trajectory": "JointTrajectory", "velocity": "Float64MultiArray"}
         self.commands, self.rival = None, None
         self.command_kind = getattr(ros, SETTINGS["reader_type"] or kinds.get(SETTINGS["command"], "String"))
@@ -182,6 +181,9 @@ class Robot:
         self.ball = place + axes @ [0.010, -0.010, 0.006 + RADIUS]
         self.talks = self.sees = True
         self.fastest, self.random = 0.0, np.random.default_rng(1)
+
+    def writer(self, name, kind, qos):
+        return DataWriter(self.participant, topic(self.participant, name, kind), qos=qos)
 
     def cells(self):
         """The forces on the tactels [N]."""
@@ -247,16 +249,13 @@ class Robot:
         if word == "second":
             self.rival = DataWriter(self.participant, self.command_topic, qos=Qos(RELIABLE))
         elif word == "twin":
-            twin = topic(self.participant, "/joint_states", ros.JointState)
-            self.twin = DataWriter(self.participant, twin, qos=Qos(Policy.Reliability.BestEffort))
+            self.twin = self.writer("/joint_states", ros.JointState, Qos(Policy.Reliability.BestEffort))
         elif word in ("quiet", "talk"):
             self.talks = word == "talk"
         elif word == "nan":
             SETTINGS["nan_at"] = 0.0
         elif word in ("blind", "see"):
             self.sees = word == "see"
-        elif word.startswith("hang "):
-            time.sleep(float(word.split()[1]))
 
 
 BEGIN = time.time()
@@ -265,7 +264,7 @@ BEGIN = time.time()
 def main():
     robot, words = Robot(), []
     threading.Thread(target=lambda: [words.append(line) for line in sys.stdin], daemon=True).start()
-    period, last, told = 1.0 / SETTINGS["rate"], time.time(), 0.0
+    period, last, printed = 1.0 / SETTINGS["rate"], time.time(), 0.0
     due = last
     while True:
         now = time.time()
@@ -275,9 +274,9 @@ def main():
         while words:
             word = words.pop(0).strip()
             robot.obey(word)
-            print(json.dumps({"told": word}), flush=True)
-        if now - told > 0.02:
-            told = now
+            print(json.dumps({"heard": word}), flush=True)
+        if now - printed > 0.02:
+            printed = now
             controller = robot.controller
             line = {"t": now, "q": robot.q.tolist(), "speed": robot.fastest, "force": force}
             line |= {"taken": controller.taken, "refused": controller.refused, "ages": controller.ages}

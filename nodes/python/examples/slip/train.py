@@ -1,10 +1,10 @@
-"""Trains the network of `slip.py` on simulated contacts, and says how often it is right on contacts that it has not seen.
+"""Trains the network of `slip.py` on simulated contacts, and prints how often it is right on others.
 
     python3 train.py
 
 In each run the arm holds a force on a ball or a pen. The object is drawn along the pad at different speeds, rests, is
-pushed against the pad, and shakes so little that the foam only shears. The simulation knows the force of friction, so it
-knows when the object slips. It takes a minute, and needs the packages tactflow and mcap.
+pushed against the pad, and shakes so little that the foam only shears. The simulation knows the force of friction, and
+so it knows when the object slips. It takes a minute, and needs the packages tactflow and mcap.
 """
 
 import argparse
@@ -99,9 +99,8 @@ def contact(tool, seed):
     drawn = motions(random)
     run = record(tool, bench(random, drawn))
     image = run["touch.calibrate.repaired"]
-    region, force, friction = (
-        dict(zip(run[name].times, run[name].values)) for name in ("touch.label.region", "truth.force", "truth.tangential")
-    )
+    names = "touch.label.region", "truth.force", "truth.tangential"
+    region, force, friction = (dict(zip(run[name].times, run[name].values)) for name in names)
     x, y = (
         (np.arange(count) - (count - 1) / 2) * pitch for count, pitch in zip(image.values.shape[:0:-1], image.pitch)
     )
@@ -113,7 +112,8 @@ def contact(tool, seed):
         last = [*last, moments(cells * region[now], x, y)][-FRAMES:]
         if len(last) < FRAMES or now < BEGIN - 1.0:
             continue
-        speed = max((np.linalg.norm(by[:2]) / (end - begin) for begin, end, by in drawn if begin <= now < end), default=0.0)
+        moves = (np.linalg.norm(by[:2]) / (end - begin) for begin, end, by in drawn if begin <= now < end)
+        speed = max(moves, default=0.0)
         seen.append(differences(last))
         slips.append(speed > SLOWEST and friction[now] > 0.95 * SLIDING * force[now])
     return np.array(seen), np.array(slips)
@@ -162,7 +162,7 @@ def main():
     network = trained(seen, slips, np.random.default_rng(0))
     unseen, truth = contacts(arguments.tactflow, range(1000, 1005))
     said = network(unseen) > 0.5
-    print(f"{len(seen)} frames to learn from, {len(unseen)} others to test with; the object slips in {truth.mean():.0%}")
+    print(f"{len(seen)} frames for the training, {len(unseen)} others for the test, with slip in {truth.mean():.0%}")
     print(f"right: {(said == truth).mean():.1%}; slip that is found: {said[truth].mean():.1%}; ", end="")
     print(f"false alarms: {said[~truth].mean():.1%} of the frames without slip")
     network.write(arguments.out)

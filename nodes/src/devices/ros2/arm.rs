@@ -14,6 +14,7 @@ use crate::arm::model::load;
 use crate::arm::mount::Mount;
 use crate::devices::arm::{self, ArmPorts};
 use crate::devices::start::{StartBounds, StartCheck};
+use crate::usual::USUAL_RAD;
 
 /// Time that a controller needs to take a message and to act on it, at most [s].
 const REACTION_S: f64 = 0.02;
@@ -54,9 +55,9 @@ pub struct Params {
     /// starts.
     #[param(unit = "rad")]
     start: Option<Vec<f64>>,
-    /// Bounds of the checks before the first command.
-    #[param(default = StartBounds::default())]
-    start_bounds: StartBounds,
+    /// Bounds of the posture.
+    #[param(default = PostureBounds::default())]
+    start_bounds: PostureBounds,
     /// Maximum acceleration of each joint.
     #[param(unit = "rad/s2", above = 0.0, default = 10.0)]
     acceleration: f64,
@@ -78,6 +79,18 @@ pub struct Params {
     /// on the robot does.
     #[param(unit = "ms", range = 1.0..=1000.0)]
     watchdog_ms: Option<f64>,
+}
+
+/// How far the joints may be from where they should be.
+#[derive(Debug, Clone, Param)]
+#[param(default)]
+struct PostureBounds {
+    /// Maximum difference between the measured and the commanded position of a joint, for trajectories.
+    #[param(unit = "rad", above = 0.0, usual = 0.0..=USUAL_RAD, default = 0.05)]
+    deflection: f64,
+    /// Maximum difference between the position of a joint and `start` when a run begins.
+    #[param(unit = "rad", above = 0.0, usual = 0.0..=USUAL_RAD, default = 0.1)]
+    posture: f64,
 }
 
 /// An arm behind topics of ROS 2, such as one of `ros2_control`. It needs no ROS installation, and has not been run on a
@@ -133,13 +146,17 @@ impl Device for Ros2Arm {
         let ports = ArmPorts::fill(description.fills(arm::ROLE), &joints, facts);
         description.on_silence(OnSilence::Stops, commanded.silence);
         description.needs_commissioning = true;
+        let PostureBounds { deflection, posture } = params.start_bounds;
+        // Nobody states a pose of the tip.
+        let bounds = StartBounds { deflection, posture, ..StartBounds::default() };
         let driver = ArmDriver {
             ports,
             site: params.place.site()?,
             states: params.states,
             command: params.command,
             names,
-            start: StartCheck::new(chain, params.start_bounds, params.start),
+            start: StartCheck::new(chain, bounds, params.start),
+            deflection,
             acceleration: params.acceleration,
             timeout: Duration::from_secs_f64(params.timeout_ms * 1e-3),
             commanded,

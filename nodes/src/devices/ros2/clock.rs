@@ -35,7 +35,7 @@ impl Agreement {
         self.smallest[0] = Some(smallest.unwrap_or(difference));
     }
 
-    /// Says why a command could not be told from an old one. `None` if the clocks agree.
+    /// Says why a controller could not recognize an old command. `None` if the clocks agree.
     pub(super) fn why_not(&self, topic: &str) -> Option<String> {
         let smallest = self.smallest.iter().flatten().copied().min_by_key(|difference| difference.abs());
         let Some(difference) = smallest else {
@@ -50,8 +50,8 @@ impl Agreement {
         let side = if difference > 0 { "behind" } else { "ahead of" };
         (difference.abs() > self.bound).then(|| {
             format!(
-                "the stamps of `{topic}` are {seconds:.3} s {side} the clock of this machine, and at most {bound_ms} ms tell \
-                 an old command from a new one: synchronize the clocks, or raise `clock_bound_ms`"
+                "the stamps of `{topic}` are {seconds:.3} s {side} the clock of this machine, and at most {bound_ms} ms are \
+                 allowed, so that an old command is recognized: synchronize the clocks, or raise `clock_bound_ms`"
             )
         })
     }

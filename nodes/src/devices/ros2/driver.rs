@@ -31,6 +31,8 @@ pub(super) struct ArmDriver {
     pub(super) command: String,
     pub(super) names: Vec<String>,
     pub(super) start: StartCheck,
+    /// Maximum difference between the measured and the commanded position of a joint [rad].
+    pub(super) deflection: f64,
     pub(super) acceleration: f64,
     pub(super) timeout: Duration,
     pub(super) commanded: Commanded,
@@ -43,19 +45,20 @@ impl Live for ArmDriver {
         let mut states = domain.read::<JointState>(&self.states).map_err(DeviceError)?;
         let output = Output::open(&domain, &self.command, &self.commanded).map_err(DeviceError)?;
         let mut session = Session::new(*self, domain, output);
-        let stopped = link.stopped();
-        tokio::pin!(stopped);
+        let (stopped, commanded) = (link.stopped(), link.commanded());
+        tokio::pin!(stopped, commanded);
         let mut ending: Option<Instant> = None;
         loop {
+            // Messages come last: a flood of them must not keep the arm from its commands.
             tokio::select! {
                 biased;
                 () = &mut stopped, if ending.is_none() => ending = Some(Instant::now()),
+                () = &mut commanded => commanded.set(link.commanded()),
+                () = sleep_until((session.looked + LOOK).into()) => session.look(),
                 message = states.next() => {
                     session.hear(&mut link, message);
                     continue;
                 }
-                () = link.commanded() => {}
-                () = sleep_until((session.looked + LOOK).into()) => session.look(),
             }
             session.judge(&mut link);
             session.send(&mut link);
@@ -104,10 +107,8 @@ struct Session {
     is_first: bool,
     /// Whether the last message that was sent ends a motion.
     has_ended: bool,
-    /// Whether the arm has stopped by itself since the last joint state.
-    has_stopped: bool,
-    /// When an arm that stops by itself is at rest.
-    rests_from: Instant,
+    /// Until when an arm comes to rest that stops by itself.
+    stops_until: Option<Instant>,
 }
 
 impl Session {
@@ -130,8 +131,7 @@ impl Session {
             sent: now,
             is_first: true,
             has_ended: true,
-            has_stopped: false,
-            rests_from: now,
+            stops_until: None,
             arm,
             domain,
             output,
@@ -183,16 +183,13 @@ impl Session {
         if stamp != 0 {
             self.agreement.hear(now, wall_clock(), stamp);
         }
-        // An arm that stops by itself takes its time.
-        if self.has_stopped && now >= self.rests_from {
-            self.has_stopped = false;
-        }
-        if self.course.rests() && !self.has_stopped && !matches!(self.phase, Phase::Ready { .. }) {
+        self.stops_until.take_if(|until| now >= *until);
+        if self.course.rests() && self.stops_until.is_none() && !self.is_ready() {
             self.course.reference.copy_from_slice(&self.position);
         }
         self.heard = Some((now, writer));
         (self.is_lost, self.bad, self.number) = (false, None, self.number + 1);
-        let is_ready = matches!(self.phase, Phase::Ready { .. });
+        let is_ready = self.is_ready();
         // A graph that is held because the arm is not ready yet would wait for the operator.
         if !is_ready && !link.is_mute() && self.begin.elapsed() < self.arm.site.patience {
             return;
@@ -203,6 +200,11 @@ impl Session {
         link.publish(|samples| {
             ports.write_with_safety(samples, stamp, number, [&self.position, equilibrium], is_ready);
         });
+    }
+
+    /// Whether the arm follows commands.
+    const fn is_ready(&self) -> bool {
+        matches!(self.phase, Phase::Ready { .. })
     }
 
     /// Looks who else is on the topics.
@@ -230,10 +232,9 @@ impl Session {
 
     /// Says which joint does not follow: a controller that is not active takes messages, and moves nothing.
     fn why_astray(&self) -> Option<String> {
-        let bound = self.arm.start.deflection();
+        let bound = self.arm.deflection;
         let joints = self.arm.names.iter().zip(self.course.reference.iter().zip(&self.position));
-        let is_following = matches!(self.phase, Phase::Ready { .. });
-        let (name, (to, at)) = joints.filter(|_| is_following).find(|(_, (to, at))| (*to - *at).abs() > bound)?;
+        let (name, (to, at)) = joints.filter(|_| self.is_ready()).find(|(_, (to, at))| (*to - *at).abs() > bound)?;
         Some(format!(
             "joint `{name}` is at {at:.4} rad, and is commanded to {to:.4} rad: they differ by more than {bound} rad. Check \
              that the controller is active and can move the arm, or raise `start_bounds.deflection`"
@@ -252,6 +253,8 @@ impl Session {
         }
         let epoch = link.epoch();
         self.phase = match (self.phase, why) {
+            // It is ready where it rests, and that is not known yet.
+            (waiting @ Phase::Waiting { .. }, None) if self.stops_until.is_some() => waiting,
             (Phase::Waiting { .. }, None) => match self.check() {
                 Ok(()) => Phase::Ready { epoch },
                 Err(why) => refused(link, why),
@@ -289,15 +292,15 @@ impl Session {
         let commands = link.commands().joints(self.arm.ports.velocity).to_vec();
         let dt = self.sent.elapsed().as_secs_f64();
         self.sent = Instant::now();
-        // Without a message for so long, the arm has stopped by itself, and is not where the commands were going.
+        // Without a message for so long, the arm stops by itself, and does not get where the commands were going.
         let is_too_long = dt > self.arm.commanded.lifespan || link.is_mute();
         if is_too_long && !self.course.rests() {
             self.course.halt();
-            (self.has_ended, self.has_stopped) = (true, true);
-            self.rests_from = Instant::now() + Duration::from_secs_f64(self.arm.commanded.silence);
+            self.has_ended = true;
+            self.stops_until = Some(self.sent + Duration::from_secs_f64(self.arm.commanded.silence));
             self.phase = Phase::Waiting { since: Instant::now() };
         }
-        if link.is_mute() || self.has_stopped {
+        if link.is_mute() || self.stops_until.is_some() {
             return;
         }
         // The operator may have resumed since it was judged. Then these commands are new, and nothing is checked yet.
@@ -308,7 +311,7 @@ impl Session {
         self.course.advance(is_checked.then_some(commands.as_slice()), dt);
         let rests = self.course.rests();
         self.is_first &= rests;
-        // At rest, an arm that follows trajectories needs no more; one that follows velocities is told so.
+        // At rest, an arm that follows trajectories needs no message. One that follows velocities gets zeros.
         let is_due = !(rests && self.has_ended) || is_checked && !self.output.ends_at_rest();
         if is_due {
             let is_sent = self.output.say(&self.course, &self.arm.names, made);

@@ -1,15 +1,13 @@
 //! `ros2_force`: a force sensor behind a topic.
 
-use std::time::{Duration, Instant};
-
 use async_trait::async_trait;
 use nalgebra::IsometryMatrix3;
 use tactflow_runtime::device::{Description, Device, DeviceError, Driver, Link, Live, Opened};
 use tactflow_runtime::node::{Describe, Mistakes, Param};
-use tokio::time::sleep_until;
 
 use super::message::WrenchStamped;
-use super::place::{Place, Site, check_topic};
+use super::place::Place;
+use super::sensor::{Sensor, stamp};
 use crate::arm::mount::Mount;
 use crate::devices::wrench::{Wrench, WrenchPorts, moved};
 
@@ -59,65 +57,31 @@ impl Device for Ros2Force {
     type Params = Params;
 
     fn open(params: Params) -> Result<Opened, Mistakes> {
-        check_topic("topic", &params.topic)?;
+        let sensor = Sensor::new(&params.place, params.topic, params.rate_hz, params.timeout_ms)?;
         let mut description = Description::every(1.0 / params.rate_hz);
         let ports = WrenchPorts::fill(&mut description, Vec::new());
-        let timeout_ms = params.timeout_ms.unwrap_or_else(|| (5e3 / params.rate_hz).max(100.0));
-        let driver = ForceDriver {
-            ports,
-            site: params.place.site()?,
-            topic: params.topic,
-            timeout: Duration::from_secs_f64(timeout_ms * 1e-3),
-            sign: if params.is_reaction { -1.0 } else { 1.0 },
-            frame: params.frame.pose(),
-        };
+        let sign = if params.is_reaction { -1.0 } else { 1.0 };
+        let driver = ForceDriver { ports, sensor, sign, frame: params.frame.pose() };
         Ok(Opened { description, driver: Driver::Live(Box::new(driver)) })
     }
 }
 
 struct ForceDriver {
     ports: WrenchPorts,
-    site: Site,
-    topic: String,
-    timeout: Duration,
+    sensor: Sensor,
     sign: f64,
     frame: IsometryMatrix3<f64>,
 }
 
 #[async_trait]
 impl Live for ForceDriver {
-    async fn run(mut self: Box<Self>, mut link: Link) -> Result<(), DeviceError> {
-        let domain = self.site.join().map_err(DeviceError)?;
-        let mut reader = domain.read::<WrenchStamped>(&self.topic).map_err(DeviceError)?;
-        let stopped = link.stopped();
-        tokio::pin!(stopped);
-        let (mut limit, mut number) = (Instant::now() + self.site.patience, 0);
-        let (mut is_lost, mut bad) = (false, None);
-        loop {
-            tokio::select! {
-                biased;
-                () = &mut stopped => return Ok(()),
-                () = sleep_until(limit.into()), if !is_lost => {
-                    is_lost = true;
-                    let why = bad.take().unwrap_or_else(|| domain.why_silent::<WrenchStamped>(&self.topic));
-                    self.ports.lose(&mut link, &why);
-                }
-                message = reader.next() => match message {
-                    Ok((message, _)) => {
-                        (limit, number) = (Instant::now() + self.timeout, number + 1);
-                        (is_lost, bad) = (false, None);
-                        let stamp = message.header.stamp.nanos();
-                        let stamp = if stamp == 0 { link.arrival() } else { link.stamp_of(stamp) };
-                        let wrench = self.wrench(&message);
-                        link.publish(|samples| self.ports.write(samples, stamp, number, &wrench));
-                    }
-                    Err(why) => {
-                        link.count("bad messages");
-                        bad = Some(format!("`{}`: {why}", self.topic));
-                    }
-                },
-            }
-        }
+    async fn run(self: Box<Self>, mut link: Link) -> Result<(), DeviceError> {
+        let take = |link: &mut Link, message: &WrenchStamped, number| {
+            let (stamp, wrench) = (stamp(link, message.header.stamp), self.wrench(message));
+            link.publish(|samples| self.ports.write(samples, stamp, number, &wrench));
+            Ok(())
+        };
+        self.sensor.follow(&mut link, take, |link, why| self.ports.lose(link, why)).await
     }
 }
 

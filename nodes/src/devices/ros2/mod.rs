@@ -1,7 +1,8 @@
 //! ROS 2 without a ROS installation: pads, force sensors and arms behind topics. `docs/ros2.md` describes their set-up.
 //!
 //! `domain` joins a domain of DDS and says what others offer there, `message` has the messages, and `place` the parameters
-//! that all devices share. `frame` reads images. `driver` runs an arm: `clock` compares the clocks, `course` makes the commands, and `output` sends
+//! that all devices share. `sensor` follows the topic of
+//! a pad or a force sensor, and `frame` reads images. `driver` runs an arm: `clock` compares the clocks, `course` makes the commands, and `output` sends
 //! them. Only `domain` does I/O.
 
 mod arm;
@@ -15,6 +16,7 @@ mod message;
 mod output;
 mod pad;
 mod place;
+mod sensor;
 
 pub use arm::Ros2Arm;
 pub use force::Ros2Force;

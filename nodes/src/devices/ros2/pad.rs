@@ -1,17 +1,14 @@
 //! `ros2_pad`: a tactile pad behind a topic.
 
-use std::time::{Duration, Instant};
-
 use async_trait::async_trait;
 use tactflow_runtime::device::{Description, Device, DeviceError, Driver, Link, Live, Opened, Output};
 use tactflow_runtime::node::{Describe, FilePath, Mistake, Mistakes, Param};
 use tactflow_runtime::signal::{Image, ImageShape, Unit};
-use tokio::time::sleep_until;
 
-use super::domain::{Domain, Reader};
 use super::frame;
-use super::message::{Float32MultiArray, Message, Picture, TactileState};
-use super::place::{Place, Site, check_topic};
+use super::message::{Float32MultiArray, Picture, TactileState, Time};
+use super::place::Place;
+use super::sensor::{Sensor, stamp};
 use crate::arm::mount::Mount;
 use crate::devices::pad::{self, PadFacts};
 
@@ -110,7 +107,7 @@ impl Device for Ros2Pad {
     type Params = Params;
 
     fn open(params: Params) -> Result<Opened, Mistakes> {
-        check_topic("topic", &params.topic)?;
+        let sensor = Sensor::new(&params.place, params.topic, params.rate_hz, params.timeout_ms)?;
         if params.channel.is_some() && params.message != Kind::TactileState {
             let message = "`channel` is the sensor of a `tactile_state`";
             return Err(Mistake::param("channel", message)
@@ -131,108 +128,55 @@ impl Device for Ros2Pad {
         };
         let shape = ImageShape { rows, cols, pitch: [pitch; 2], unit };
         let image = pad::fill(description.fills(pad::ROLE), shape, facts.facts()?);
-        let timeout_ms = params.timeout_ms.unwrap_or_else(|| (5e3 / params.rate_hz).max(100.0));
-        let driver = PadDriver {
-            image,
-            site: params.place.site()?,
-            topic: params.topic,
-            kind: params.message,
-            channel: params.channel,
-            cells: vec![0.0; rows * cols],
-            cols,
-            timeout: Duration::from_secs_f64(timeout_ms * 1e-3),
-        };
+        let (kind, channel, cells) = (params.message, params.channel, vec![0.0; rows * cols]);
+        let driver = PadDriver { image, sensor, kind, channel, cells, cols };
         Ok(Opened { description, driver: Driver::Live(Box::new(driver)) })
     }
 }
 
 struct PadDriver {
     image: Output<Image>,
-    site: Site,
-    topic: String,
+    sensor: Sensor,
     kind: Kind,
     channel: Option<String>,
     /// The newest image.
     cells: Vec<f32>,
     cols: usize,
-    timeout: Duration,
 }
 
 #[async_trait]
 impl Live for PadDriver {
-    async fn run(mut self: Box<Self>, mut link: Link) -> Result<(), DeviceError> {
-        let domain = self.site.join().map_err(DeviceError)?;
-        let topic = self.topic.clone();
-        match self.kind {
+    async fn run(self: Box<Self>, mut link: Link) -> Result<(), DeviceError> {
+        let Self { image, sensor, kind, channel, mut cells, cols } = *self;
+        let lose = |link: &mut Link, why: &str| link.lost(image, why.to_owned());
+        let publish = |link: &mut Link, cells: &[f32], time: Time, number: u64| {
+            let stamp = stamp(link, time);
+            link.publish(|samples| samples.write(image, stamp, number).cells_mut().copy_from_slice(cells));
+        };
+        match kind {
             Kind::Image => {
-                let cols = self.cols;
-                let read = move |picture: &Picture, cells: &mut [f32]| {
-                    frame::of_picture(picture, cells, cols).map(|()| picture.header.stamp.nanos())
+                let take = |link: &mut Link, picture: &Picture, number| {
+                    frame::of_picture(picture, &mut cells, cols)?;
+                    publish(link, &cells, picture.header.stamp, number);
+                    Ok(())
                 };
-                let reader = domain.read(&topic).map_err(DeviceError)?;
-                self.follow(&mut link, &domain, reader, read).await;
+                sensor.follow(&mut link, take, lose).await
             }
             Kind::Array => {
-                let cols = self.cols;
-                let read =
-                    move |array: &Float32MultiArray, cells: &mut [f32]| frame::of_array(array, cells, cols).map(|()| 0);
-                let reader = domain.read(&topic).map_err(DeviceError)?;
-                self.follow(&mut link, &domain, reader, read).await;
+                let take = |link: &mut Link, array: &Float32MultiArray, number| {
+                    frame::of_array(array, &mut cells, cols)?;
+                    publish(link, &cells, Time::default(), number);
+                    Ok(())
+                };
+                sensor.follow(&mut link, take, lose).await
             }
             Kind::TactileState => {
-                let channel = self.channel.clone();
-                let read = move |state: &TactileState, cells: &mut [f32]| {
-                    frame::of_state(state, channel.as_deref(), cells).map(|()| state.header.stamp.nanos())
+                let take = |link: &mut Link, state: &TactileState, number| {
+                    frame::of_state(state, channel.as_deref(), &mut cells)?;
+                    publish(link, &cells, state.header.stamp, number);
+                    Ok(())
                 };
-                let reader = domain.read(&topic).map_err(DeviceError)?;
-                self.follow(&mut link, &domain, reader, read).await;
-            }
-        }
-        Ok(())
-    }
-}
-
-impl PadDriver {
-    /// Publishes images until the run ends. `read` returns the stamp of a message [ns], 0 for none.
-    async fn follow<M: Message>(
-        &mut self,
-        link: &mut Link,
-        domain: &Domain,
-        mut reader: Reader<M>,
-        read: impl Fn(&M, &mut [f32]) -> Result<i64, String>,
-    ) {
-        let stopped = link.stopped();
-        tokio::pin!(stopped);
-        let (mut limit, mut number) = (Instant::now() + self.site.patience, 0);
-        let (mut is_lost, mut bad) = (false, None);
-        loop {
-            tokio::select! {
-                biased;
-                () = &mut stopped => return,
-                () = sleep_until(limit.into()), if !is_lost => {
-                    is_lost = true;
-                    let why = bad.take().unwrap_or_else(|| domain.why_silent::<M>(&self.topic));
-                    link.lost(self.image, why);
-                }
-                message = reader.next() => {
-                    let good = message.and_then(|(message, _)| {
-                        read(&message, &mut self.cells).map_err(|why| format!("`{}`: {why}", self.topic))
-                    });
-                    match good {
-                        Ok(stamp) => {
-                            (limit, number) = (Instant::now() + self.timeout, number + 1);
-                            (is_lost, bad) = (false, None);
-                            let stamp = if stamp == 0 { link.arrival() } else { link.stamp_of(stamp) };
-                            link.publish(|samples| {
-                                samples.write(self.image, stamp, number).cells_mut().copy_from_slice(&self.cells);
-                            });
-                        }
-                        Err(why) => {
-                            link.count("bad messages");
-                            bad = Some(why);
-                        }
-                    }
-                }
+                sensor.follow(&mut link, take, lose).await
             }
         }
     }

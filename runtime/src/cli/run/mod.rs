@@ -36,7 +36,7 @@ use super::text::number::{milliseconds, seconds};
 use super::text::prose::PageStyle;
 use crate::engine::{self, End, Engine, Interrupt, Outcome, RunOptions};
 use crate::fault::Fault;
-use crate::graph::{Compiled, Request};
+use crate::graph::{Compiled, Request, WORDS};
 use crate::record::PointsRequest;
 use crate::source::{Code, quoted};
 
@@ -311,7 +311,7 @@ impl Job {
 
     /// Checks that the graph or the runtime knows every word that is sent.
     fn check_words(&self, engine: &Engine) -> Result<(), String> {
-        let is_own = |word: &str| ["stop", "resume", "tare"].iter().any(|own| word.eq_ignore_ascii_case(own));
+        let is_own = |word: &str| WORDS.iter().any(|own| word.eq_ignore_ascii_case(own));
         let words = engine.words();
         let is_unknown = |word: &str| !is_own(word) && words.iter().all(|known| known != word);
         let Some((_, word)) = self.options.send.iter().find(|(_, word)| is_unknown(word)) else { return Ok(()) };

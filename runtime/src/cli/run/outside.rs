@@ -74,9 +74,9 @@ impl<'s> Outside<'s> {
     ) -> Self {
         let Some(facts) = facts else { return Self { changes, socket: None } };
         match open(engine, facts) {
-            Ok(OpenedSocket { socket, feed, stops, requests }) => {
-                options.stops = Some(stops);
-                let changes = changes.map(|changes| changes.with_requests(requests));
+            Ok(OpenedSocket { socket, feed, requests, changes: wanted }) => {
+                options.requests = Some(requests);
+                let changes = changes.map(|changes| changes.with_requests(wanted));
                 Self { changes, socket: Some(OpenSocket { _socket: socket, feed }) }
             }
             Err(why) => {

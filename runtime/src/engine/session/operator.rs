@@ -21,8 +21,8 @@ pub(crate) struct OperatorInput {
     tasks: Vec<String>,
     /// The standard input; `None` if it is not read or has ended.
     reader: Option<LineReader>,
-    /// Stops that other threads request.
-    stops: Option<Arc<RunRequests>>,
+    /// What other threads request.
+    requests: Option<Arc<RunRequests>>,
     warnings: Warnings,
 }
 
@@ -37,8 +37,8 @@ impl OperatorInput {
         scheduled.sort_by_key(|(at, _)| *at);
         let tasks: Vec<String> = engine.tasks().iter().skip(1).map(TaskRun::name).map(str::to_owned).collect();
         let reader = options.listens.then(|| LineReader::start(stdin(), tasks.clone(), is_back_later)).transpose()?;
-        let stops = options.stops.clone();
-        Ok(Self { scheduled: scheduled.into(), tasks, reader, stops, warnings: Warnings::default() })
+        let requests = options.requests.clone();
+        Ok(Self { scheduled: scheduled.into(), tasks, reader, requests, warnings: Warnings::default() })
     }
 
     /// Sends the words that are due at `now` [ns] to the engine, each stop before all others.
@@ -47,8 +47,8 @@ impl OperatorInput {
         let due = self.scheduled.drain(..due).map(|(_, word)| word);
         let (stop, others): (Vec<String>, Vec<String>) = due.partition(|word| stops(word, &self.tasks));
         stop.iter().for_each(|word| warn(engine.send(word)));
-        if let Some(stops) = &self.stops {
-            stops.carry_out(engine, warn);
+        if let Some(requests) = &self.requests {
+            requests.carry_out(engine, warn);
         }
         self.carry_out_lines(engine, now);
         others.iter().for_each(|word| warn(engine.send(word)));

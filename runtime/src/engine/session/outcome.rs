@@ -22,8 +22,8 @@ pub struct RunOptions {
     pub listens: bool,
     /// Ends the run as Ctrl-C does, once somebody sets it.
     pub cancel: Option<Arc<AtomicBool>>,
-    /// Stops that other threads request.
-    pub stops: Option<Arc<RunRequests>>,
+    /// Stops and tares that other threads request.
+    pub requests: Option<Arc<RunRequests>>,
 }
 
 /// Why a run ended.

@@ -4,7 +4,7 @@ use super::engine::Engine;
 use super::tare::TARE;
 use super::task_run::TaskRun;
 use super::trouble::Trouble;
-use crate::graph::Policy;
+use crate::graph::{Policy, WORDS};
 use crate::source::suggestion;
 
 /// What a word does in a task.
@@ -19,8 +19,8 @@ enum Effect {
 const STOPPED: &str = "has no effect while the commands are stopped: send `resume` first";
 
 impl Engine {
-    /// Sends an operator word. `stop` halts the commands, `resume` ends the halt, and `tare` takes the zeros of the sensors
-    /// anew, in upper or lower case; other words go to the modes. A bare word reaches all tasks, and `left.stop` only the task `left` and those in it.
+    /// Sends an operator word, in upper or lower case. `stop` halts the commands, `resume` ends the halt, and `tare` takes
+    /// the zeros of the sensors anew. Other words go to the modes. A bare word reaches all tasks, and `left.stop` only the task `left` and those in it.
     ///
     /// A `stop` takes effect in the next tick. It voids every word before that tick, sent before it or after it.
     ///
@@ -129,13 +129,13 @@ impl Engine {
     /// Returns the operator words that the graph accepts, each once and in the order of the alphabet.
     #[must_use]
     pub fn words(&self) -> Vec<String> {
-        let own = || ["stop", "resume"].into_iter();
+        // A part is stopped and resumed alone, and tared with all others.
+        let own = || WORDS.into_iter().filter(|word| *word != TARE);
         let mut words: Vec<String> =
-            own().chain(self.tasks.iter().flat_map(TaskRun::words)).map(str::to_owned).collect();
+            WORDS.into_iter().chain(self.tasks.iter().flat_map(TaskRun::words)).map(str::to_owned).collect();
         for task in self.tasks.iter().skip(1) {
             words.extend(own().chain(task.words()).map(|word| format!("{}.{word}", task.name())));
         }
-        words.push(TARE.to_owned());
         words.sort();
         words.dedup();
         words

@@ -7,7 +7,7 @@ use std::ops::Range;
 use crate::graph::load::{Entity, MeasuredValues};
 use crate::graph::net::{Net, Resolved};
 use crate::graph::plan::{Condition, PlannedExit, PlannedPort, PortRef, Test, WatchedPort};
-use crate::graph::syntax::{ExitKind, ExitTable, ModeBlock, ModeExit, PortState, into_diagnostic};
+use crate::graph::syntax::{ExitKind, ExitTable, ModeBlock, ModeExit, PortState, WORDS, into_diagnostic};
 use crate::node::Spanned;
 use crate::signal::{Kind, Shape};
 use crate::source::{Code, Diagnostic, Diagnostics, quoted};
@@ -338,7 +338,7 @@ fn sent_condition(word: &Spanned<String>) -> Resolved<(Condition, String)> {
         )
         .into_err();
     }
-    if ["stop", "resume", "tare"].contains(&word.value.as_str()) {
+    if WORDS.contains(&word.value.as_str()) {
         let help = "`stop` halts the run, `resume` continues it, and `tare` takes the zeros of its sensors anew: choose another word";
         return bad_condition(&word.span, format!("the word `{}` is reserved", word.value)).help(help).into_err();
     }

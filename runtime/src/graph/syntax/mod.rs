@@ -24,7 +24,9 @@ pub(crate) use names::Use;
 pub use policy::Policy;
 pub(crate) use policy::{AgeLimit, OnFail, PolicyTable, default_max_age_ns, default_max_age_s};
 pub(crate) use record::RecordTable;
-pub(crate) use reserved::{ALLOW_UNCALIBRATED, INPUTS, LIMITS, LIVE, MODES, NO_ARM, ROBOT, SENSOR, TASK_SECTIONS};
+pub(crate) use reserved::{
+    ALLOW_UNCALIBRATED, INPUTS, LIMITS, LIVE, MODES, NO_ARM, ROBOT, SENSOR, TASK_SECTIONS, WORDS,
+};
 pub(crate) use sections::{
     BenchDocument, Block, CommandEntry, GraphDocument, GraphTable, PartBlock, Sections, WireEntry, into_diagnostic,
 };

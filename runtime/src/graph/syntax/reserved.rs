@@ -49,6 +49,9 @@ pub(crate) const MODES: &str = "modes";
 /// Reserved names, which have another meaning in wires and facts.
 const RESERVED: [&str; 3] = [INPUTS, LIMITS, MODES];
 
+/// The words of the operator that every run knows.
+pub(crate) const WORDS: [&str; 3] = ["stop", "resume", "tare"];
+
 /// Returns whether a text is a valid name.
 pub(super) fn is_name(name: &str) -> bool {
     let is_word = |c: char| c.is_ascii_lowercase() || c.is_ascii_digit() || c == '_';
