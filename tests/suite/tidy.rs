@@ -127,7 +127,6 @@ fn only_the_edge_names_tokio() {
     let edge = [
         "runtime/src/device/live.rs",
         "runtime/src/engine/session/caught.rs",
-        "runtime/src/engine/session/signals.rs",
         "runtime/src/socket/hub.rs",
         "runtime/src/socket/lines.rs",
         "runtime/src/socket/server.rs",
@@ -152,8 +151,7 @@ fn only_the_edge_names_tokio() {
         "nodes/src/devices/process/session.rs",
         "nodes/src/devices/process/stepped.rs",
         "nodes/src/devices/ros2/driver.rs",
-        "nodes/src/devices/ros2/force.rs",
-        "nodes/src/devices/ros2/pad.rs",
+        "nodes/src/devices/ros2/sensor.rs",
         "nodes/src/devices/stream/driver.rs",
         "nodes/src/tool/sniff.rs",
     ];

@@ -43,7 +43,8 @@ impl Engine {
         }
         keepers.iter().for_each(|at| self.core.tare(*at));
         let names: Vec<&str> = keepers.iter().map(|at| self.names[*at].0.as_str()).collect();
-        tracing::info!("the zeros of {} are taken anew", quoted(&names));
-        Ok(format!("the zeros of {} are taken anew", quoted(&names)))
+        let tared = format!("the zeros of {} are taken anew", quoted(&names));
+        tracing::info!("{tared}");
+        Ok(tared)
     }
 }

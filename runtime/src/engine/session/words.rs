@@ -20,7 +20,8 @@ const STOPPED: &str = "has no effect while the commands are stopped: send `resum
 
 impl Engine {
     /// Sends an operator word, in upper or lower case. `stop` halts the commands, `resume` ends the halt, and `tare` takes
-    /// the zeros of the sensors anew. Other words go to the modes. A bare word reaches all tasks, and `left.stop` only the task `left` and those in it.
+    /// the zeros of the sensors anew. Other words go to the modes. A bare word reaches all tasks, and `left.stop` only the
+    /// task `left` and those in it.
     ///
     /// A `stop` takes effect in the next tick. It voids every word before that tick, sent before it or after it.
     ///
