@@ -565,7 +565,7 @@ def open(path: str) -> Recording:  # noqa: A001
 
 def _values(kind: str, columns: List[str], messages: List[Dict[str, Any]]) -> np.ndarray:
     """Returns the values of a port as one array."""
-    if kind in ("image", "mask"):
+    if kind in ("image", "vector_image", "mask"):
         return np.stack([_grid(message) for message in messages])
     if kind == "flag":
         return np.array([message["value"] for message in messages], dtype=object)
@@ -580,10 +580,11 @@ def _values(kind: str, columns: List[str], messages: List[Dict[str, Any]]) -> np
 
 
 def _grid(message: Dict[str, Any]) -> np.ndarray:
-    """Returns the cells of an image or a mask, the first row first."""
+    """Returns the cells of an image, a vector image or a mask, the first row first."""
     import base64
 
     data, cols = base64.b64decode(message["data"]), message["column_count"]
-    kind = {1: np.uint8, 4: np.dtype("<f4")}[message["cell_stride"]]
-    cells = np.frombuffer(data, kind).reshape(-1, cols)
+    kind = np.uint8 if message["cell_stride"] == 1 else np.dtype("<f4")
+    axes = len(message["fields"])
+    cells = np.frombuffer(data, kind).reshape((-1, cols, axes) if axes > 1 else (-1, cols))
     return cells.astype(bool) if kind is np.uint8 else cells
