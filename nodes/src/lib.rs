@@ -94,8 +94,8 @@ fn edge() -> Catalogue {
     catalogue
 }
 
-/// Everything there is: one line each.
-pub fn catalogue() -> Catalogue {
+/// The nodes that measure a contact, after the edge: one line each.
+fn touch() -> Catalogue {
     edge()
         .group("touch: from a tactile image to features of the contact")
         .node::<touch::tactile_source::TactileSource>()
@@ -118,6 +118,11 @@ pub fn catalogue() -> Catalogue {
         .node::<touch::moving_average::MovingAverage>()
         .node::<touch::low_pass::LowPass>()
         .node::<touch::median::Median>()
+}
+
+/// Everything there is: one line each.
+pub fn catalogue() -> Catalogue {
+    touch()
         .group("servo: from features to a twist of the sensor")
         .node::<servo::feature_error::FeatureError>()
         .node::<servo::deadband::Deadband>()

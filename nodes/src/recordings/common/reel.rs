@@ -162,7 +162,7 @@ impl Reel {
         }
         let (Self { frames, cells, drag, dead, .. }, Properties { threshold, force, .. }) = (self, found);
         let shape = ImageShape { rows, cols, pitch, unit };
-        Ok(Recording { format, shape, frames, cells, drag: drag, dead, threshold, period, force })
+        Ok(Recording { format, shape, frames, cells, drag, dead, threshold, period, force })
     }
 }
 

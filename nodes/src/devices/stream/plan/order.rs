@@ -96,7 +96,7 @@ fn tangential(params: &Params, names: &[String], axis: usize, mistakes: &mut Mis
         mistakes.push(wrong("a vector image needs three axes".into()).help(help));
         return None;
     }
-    let &[ref x, ref y] = names else {
+    let [x, y] = names else {
         let mistake = wrong(format!("`tangential` has {} names", names.len()));
         mistakes.push(mistake.help("write the axes along x and y of the image: `tangential = [\"x\", \"y\"]`"));
         return None;
