@@ -12,7 +12,7 @@ use tactflow_runtime::signal::{Image, ImageShape, Scalar, Unit, VectorImage, Vec
 use tactflow_tests::{catalogue, workspace};
 
 use crate::record::has_python_module;
-use crate::tool::{peer, say};
+use crate::tool::{peer, said, say, tool};
 
 fn hold() -> Request {
     Request::file(workspace().join("graphs/hold_without_slip.toml"))
@@ -142,4 +142,49 @@ fn vector_images_are_recorded_exported_compared_and_shown() {
     assert_eq!(found["shapes"], serde_json::json!([[250, 16, 16, 3], [211, 16, 16, 3]]));
     assert_eq!(found["same"], true, "the recording and the archive have the same numbers");
     assert_eq!(found["units"], serde_json::json!(["raw", "N"]));
+}
+
+/// A node in Python that adds up the drag of a vector image.
+const DRAG: &str = r#"
+import tactflow
+from tactflow import Scalar, VectorImage
+
+
+@tactflow.node
+def drag(vectors: VectorImage["N"]) -> {"along": Scalar["N"], "across": Scalar["N"]}:
+    """How the pad is dragged."""
+    if vectors is None:
+        return {}
+    along, across, _ = vectors.cells.sum(axis=(0, 1), dtype=float)
+    return {"along": along, "across": across}
+
+
+tactflow.main(drag)
+"#;
+
+#[test]
+fn a_program_reads_vector_images() {
+    if !has_python_module("numpy") {
+        return;
+    }
+    let (folder, package) = (tempfile::tempdir().unwrap(), workspace().join("nodes/python"));
+    let path = |name: &str| folder.path().join(name).to_str().unwrap().to_owned();
+    fs::write(path("drag.py"), DRAG).unwrap();
+    let signature = path("drag.node.toml");
+    let stated =
+        said(tool(&["signature", "--out", &signature, "--", "python3", &path("drag.py")]).env("PYTHONPATH", &package));
+    assert_eq!((stated.code, stated.err.as_str()), (0, ""), "{}", stated.out);
+    let graph = "graph.clock = 'pad'\nroles.pad = 'three_axis_pad'\nbind.pad = 'pad'\n\
+        [devices.pad]\ntype = 'mock_pad'\nfor_s = 0.2\npress = [{ drag = [0.6, -0.2] }]\n\
+        [nodes.drag]\ntype = 'process'\nsignature = 'drag.node.toml'\ncommand = ['python3', 'drag.py']\n\
+        in.vectors = 'pad.vectors'\n";
+    fs::write(path("graph.toml"), graph).unwrap();
+    let said = said(tool(&["run", &path("graph.toml"), "--out", &path("run.csv")]).env("PYTHONPATH", &package));
+    assert_eq!(said.code, 0, "{}{}", said.out, said.err);
+    let table = fs::read_to_string(path("run.csv")).unwrap();
+    let mut lines = table.lines().filter(|line| !line.starts_with('#'));
+    let names: Vec<&str> = lines.next().unwrap().split(',').collect();
+    let last: Vec<&str> = lines.last().unwrap().split(',').collect();
+    let value = |name: &str| last[names.iter().position(|known| *known == name).unwrap()].parse::<f64>().unwrap();
+    assert!((value("drag.along") - 0.6).abs() < 1e-5 && (value("drag.across") + 0.2).abs() < 1e-5, "{last:?}");
 }
