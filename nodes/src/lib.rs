@@ -71,6 +71,10 @@ fn edge() -> Catalogue {
         .device::<sim::bench::SimBench>()
         .device::<sim::pair::SimPair>()
         .device::<devices::lockstep::Lockstep>();
+    #[cfg(feature = "mcap")]
+    let catalogue = catalogue.device::<devices::replay::Replay>();
+    #[cfg(not(feature = "mcap"))]
+    let catalogue = catalogue.left_out(&["replay"], "build the tool with recordings: add `--features mcap`");
     #[cfg(feature = "drivers")]
     let catalogue = catalogue
         .device::<devices::stream::Stream>()

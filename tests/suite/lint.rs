@@ -22,10 +22,10 @@ fn count(step: &mut dyn FnMut()) -> u64 {
 
 #[test]
 fn everything_is_documented_and_every_example_runs() {
-    // The simulator of `lockstep` is the reader's own: `lockstep.rs` runs its example with one. What presses on the pad
-    // of the examples is round, so no image holds a line.
+    // The simulator of `lockstep` and the recording of `replay` are the reader's own: `lockstep.rs` and `replay_bench.rs`
+    // run with one. What presses on the pad of the examples is round, so no image holds a line.
     let shipped = tactflow_nodes::catalogue();
-    let lint_shipped = lint(&shipped).counting(count).without_example_of(&["lockstep"]);
+    let lint_shipped = lint(&shipped).counting(count).without_example_of(&["lockstep", "replay"]);
     let of_bends = ["curvature.orientation", "curvature.turn", "curvature.length", "curvature.rate"];
     let of_lines = [&["hough.orientation", "hough.offset"], &of_bends[..]].concat();
     // The arm of the examples does not press, so nothing shows how stiff the contact is.

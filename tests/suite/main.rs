@@ -76,6 +76,7 @@ mod record;
 mod recordings;
 mod reference;
 mod replay;
+mod replay_bench;
 mod report;
 mod reports;
 mod resume;

@@ -184,7 +184,7 @@ fn a_program_reads_vector_images() {
     let table = fs::read_to_string(path("run.csv")).unwrap();
     let mut lines = table.lines().filter(|line| !line.starts_with('#'));
     let names: Vec<&str> = lines.next().unwrap().split(',').collect();
-    let last: Vec<&str> = lines.last().unwrap().split(',').collect();
+    let last: Vec<&str> = lines.next_back().unwrap().split(',').collect();
     let value = |name: &str| last[names.iter().position(|known| *known == name).unwrap()].parse::<f64>().unwrap();
     assert!((value("drag.along") - 0.6).abs() < 1e-5 && (value("drag.across") + 0.2).abs() < 1e-5, "{last:?}");
 }

@@ -17,6 +17,8 @@ pub(crate) mod pad;
 #[cfg(feature = "process")]
 pub mod process;
 pub mod recording;
+#[cfg(feature = "mcap")]
+pub mod replay;
 #[cfg(feature = "ros2")]
 pub mod ros2;
 #[cfg(feature = "drivers")]

@@ -6,7 +6,7 @@ use std::marker::PhantomData;
 use super::silence::{OnSilence, Silence};
 use super::{Again, RoleType};
 use crate::node::PortSpec;
-use crate::signal::{JointsShape, Kind, Shape, Signal, Unit};
+use crate::signal::{Joint, JointsShape, Kind, Shape, Signal, Unit};
 
 /// A name that is written in the source or made at load.
 type Name = Cow<'static, str>;
@@ -40,6 +40,10 @@ pub struct Description {
     /// Whether it moves something real: a run uses a tenth of its limits until somebody has proven, with the command
     /// that commissions a bench, that it stops by itself.
     pub needs_commissioning: bool,
+    /// Whether it follows no command, as one that plays a recording. A run says so at its start.
+    pub is_open_loop: bool,
+    /// What a run says at its start about the commands to the device, one sentence each.
+    pub(crate) notes: Vec<String>,
     /// Whether the bench lets the device come back after it was lost.
     pub(crate) may_return: bool,
     /// Opens it once more; `None` if it was not opened from a bench.
@@ -87,6 +91,11 @@ impl Description {
         self.on_silence.as_ref().map_or(0.1, |silence| silence.within)
     }
 
+    /// Adds a sentence about the commands to the device, which a run says at its start.
+    pub fn note(&mut self, text: impl Into<String>) {
+        self.notes.push(text.into());
+    }
+
     /// Adds a role that the device can fill.
     pub fn fills(&mut self, role: impl Into<Name>) -> Fill<'_> {
         self.add_role(role.into(), None)
@@ -120,11 +129,27 @@ impl Description {
 
     /// Multiplies the maximum speed of each joint.
     pub(crate) fn slow_down(&mut self, fraction: f64) {
-        for port in self.outputs.iter_mut().chain(&mut self.commands) {
-            if let Shape::Joints(shape) = &mut port.shape {
-                shape.joints.iter_mut().for_each(|joint| joint.speed *= fraction);
-            }
+        self.joints().for_each(|joint| joint.speed *= fraction);
+    }
+
+    /// Takes back that the maximum speed of each joint was multiplied. The same fraction gives the same speeds again, to
+    /// the last bit.
+    #[cfg(feature = "mcap")]
+    pub(crate) fn undo_slow_down(&mut self, fraction: f64) {
+        for joint in self.joints() {
+            let whole = joint.speed / fraction;
+            let gives_it = |speed: &f64| (speed * fraction).to_bits() == joint.speed.to_bits();
+            joint.speed = [whole, whole.next_up(), whole.next_down()].into_iter().find(gives_it).unwrap_or(whole);
         }
+    }
+
+    /// Returns the joints of all ports.
+    fn joints(&mut self) -> impl Iterator<Item = &mut Joint> {
+        let ports = self.outputs.iter_mut().chain(&mut self.commands);
+        ports.flat_map(|port| match &mut port.shape {
+            Shape::Joints(shape) => shape.joints.as_mut_slice(),
+            _ => &mut [],
+        })
     }
 
     /// The outputs of all roles with their shapes, in the order in which they were stated.

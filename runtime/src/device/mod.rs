@@ -224,6 +224,9 @@ pub trait Device: Describe + Sized + 'static {
     /// the reports of the role that it [states](Self::role), and its outputs are the outputs of that role.
     const IS_NODE: bool = false;
 
+    /// Whether it plays a recorded device, which had its robot and its sensor: their files give limits, and no parameters.
+    const IS_RECORDED: bool = false;
+
     /// Returns the type of role that such a block fills. Its name is that of the role in the description.
     ///
     /// # Errors
@@ -258,6 +261,10 @@ pub trait DeviceType: Send + Sync {
     fn params(&self) -> Vec<ParamSpec>;
     /// Whether a block of the section `[nodes]` may have this type.
     fn is_node(&self) -> bool {
+        false
+    }
+    /// Whether it plays a recorded device, which had its robot and its sensor.
+    fn is_recorded(&self) -> bool {
         false
     }
     /// Reads the parameters of such a block, and returns the type of the role that it fills. The reader collects the
@@ -299,6 +306,10 @@ impl<D: Device> DeviceType for TypedDevice<D> {
 
     fn is_node(&self) -> bool {
         D::IS_NODE
+    }
+
+    fn is_recorded(&self) -> bool {
+        D::IS_RECORDED
     }
 
     fn role(&self, table: &Value, reader: &mut Reader<'_>) -> Option<RoleType> {

@@ -11,11 +11,16 @@ use crate::signal::Shape;
 pub struct RecordedDevice {
     /// Its name in the bench.
     pub name: String,
+    /// The names of the roles that it filled in the graph.
+    #[serde(default)]
+    pub roles: Vec<String>,
     is_live: bool,
     /// Nominal time between two samples [s].
     period: f64,
     latency: f64,
     may_return: bool,
+    #[serde(default)]
+    is_open_loop: bool,
     #[serde(default)]
     fills: Vec<RecordedRole>,
     #[serde(default)]
@@ -73,15 +78,28 @@ impl RecordedDevice {
         let ports = |ports: &[StatedPort]| ports.iter().map(RecordedPort::of).collect();
         Self {
             name: name.to_owned(),
+            roles: Vec::new(),
             is_live,
             period: description.period,
             latency: description.latency,
             may_return: description.may_return,
+            is_open_loop: description.is_open_loop,
             fills: description.fills.iter().map(role).collect(),
             outputs: ports(&description.outputs),
             commands: ports(&description.commands),
             reports: ports(&description.reports),
         }
+    }
+
+    /// Names the roles that it filled in the graph.
+    pub(crate) fn with_roles(self, roles: Vec<String>) -> Self {
+        Self { roles, ..self }
+    }
+
+    /// Whether it computed beside the tick of its graph, as a node: such a role has the type and the name of the node.
+    #[cfg(feature = "mcap")]
+    pub(crate) fn is_node(&self) -> bool {
+        self.fills.iter().any(|fill| fill.role.contains(' '))
     }
 
     /// Returns the facts of each role in which the device sends values of that shape.
@@ -108,6 +126,7 @@ impl RecordedDevice {
             period: self.period,
             latency: self.latency,
             may_return: self.may_return,
+            is_open_loop: self.is_open_loop,
             fills: self.fills.iter().map(fill).collect(),
             outputs: stated(&self.outputs),
             commands: stated(&self.commands),

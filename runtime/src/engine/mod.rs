@@ -13,3 +13,5 @@ pub use session::{
     Outcome, Punctuality, Rest, RunOptions, RunRequests, ScheduledChanges, TareAnswer, TaskEnd, TaskRun, TickUse,
     ValueChange, Walk, block_io_signals, run, run_changing, run_virtual,
 };
+#[cfg(feature = "mcap")]
+pub(crate) use session::{InputItem, read_port};

@@ -22,7 +22,8 @@ pub struct Tick {
     /// Whether the operator sent `resume` before this tick.
     pub is_resumed: bool,
     /// Whether the device did not get the command of this node in the last tick, although it is wired to it: the command
-    /// was absent, or a task that drives the device rests, so the runtime ramped to zero, or back to the command.
+    /// was absent, a task that drives the device rests, so the runtime ramped to zero, or back to the command, or the
+    /// device follows no command at all.
     pub is_overruled: bool,
 }
 

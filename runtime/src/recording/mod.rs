@@ -21,6 +21,7 @@
 mod about;
 mod channels;
 mod compare;
+mod device;
 mod diff;
 mod export;
 mod json;
@@ -38,6 +39,7 @@ mod writer;
 pub use about::RunAbout;
 pub(crate) use about::about_run;
 pub use compare::{Differences, PortDifference};
+pub use device::{PlayError, play_device};
 pub use diff::{RecordingDiff, diff};
 pub use export::{Exported, export};
 pub use pad::{PadError, RecordedPad};

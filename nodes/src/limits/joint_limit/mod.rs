@@ -175,6 +175,10 @@ impl Node for JointLimit {
             out.stuck.set(following.note(tick, limiter.velocities(), equilibrium));
         } else {
             following.pause();
+            // An arm that does not get the commands has still not failed to follow them.
+            if is_arm_fresh {
+                out.stuck.set(following.stuck().is_some());
+            }
         }
         let Some([lead, position, speed, acceleration]) =
             limiter.limit(&self.joints, self.lead, tick, wanted, position, equilibrium)

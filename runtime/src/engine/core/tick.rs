@@ -147,7 +147,8 @@ impl Core {
             let is_halted = command.tasks.iter().any(|task| self.tasks[*task].is_halted);
             command.commit(&self.bus, &mut devices[command.device].commands, &self.tick, is_halted);
             if let Some(maker) = command.maker {
-                self.runners[maker].is_overruled = !command.follows;
+                let is_open_loop = devices[command.device].description.is_open_loop;
+                self.runners[maker].is_overruled = is_open_loop || !command.follows;
             }
         }
         for report in &self.reports {

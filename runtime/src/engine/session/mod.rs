@@ -11,6 +11,7 @@ mod drivers;
 mod engine;
 mod failures;
 mod halt;
+mod input_items;
 mod inputs;
 mod leases;
 mod line_reader;
@@ -35,6 +36,8 @@ pub use changer::{Changer, Walk};
 pub use drive::run_virtual;
 pub use engine::{DisplayedPort, Engine, Logged};
 pub use halt::{Halt, Rest};
+#[cfg(feature = "mcap")]
+pub(crate) use input_items::{InputItem, read_port};
 pub use live_values::{LiveValue, ValueChange};
 pub use outcome::{End, Outcome, RunOptions};
 pub use punctuality::{Beginning, LateTick, Punctuality, TickUse};

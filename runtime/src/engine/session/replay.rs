@@ -1,9 +1,10 @@
 //! Replays the inputs of a recording: writes the samples of the devices, sends the words and runs the tick.
 
 use super::engine::Engine;
-use super::inputs::{BEGAN, EXCHANGE, FAILURE, InputLog, LEASE, PORT, REST, STATES, TICK, VALUE, WORD};
+use super::input_items::{InputItem, read_port};
+use super::inputs::{InputLog, TICK, WORD};
 use super::punctuality::Beginning;
-use crate::device::{RecordedDevice, SampleState};
+use crate::device::RecordedDevice;
 use crate::engine::core::{DeviceLink, DeviceSlot};
 use crate::fault::Fault;
 use crate::signal::ByteReader;
@@ -48,8 +49,12 @@ impl Engine {
             DeviceLink::Stepped(_) | DeviceLink::Gone => device.is_beside,
             DeviceLink::Recorded { is_live } => is_live,
         };
-        let device = |device: &DeviceSlot| RecordedDevice::of(&device.name, &device.description, is_live(device));
-        self.devices.iter().map(device).collect()
+        let devices = self.devices.iter().zip(&self.device_roles);
+        let device = |(device, roles): (&DeviceSlot, &Vec<usize>)| {
+            let roles = roles.iter().map(|role| self.roles[*role].0.clone()).collect();
+            RecordedDevice::of(&device.name, &device.description, is_live(device)).with_roles(roles)
+        };
+        devices.map(device).collect()
     }
 
     /// Runs a tick with the inputs of a recording. The devices of the graph must be those of the recording.
@@ -61,11 +66,11 @@ impl Engine {
         let (mut now, mut began, mut has_sampled, mut values) = (None, None, false, Vec::new());
         while !reader.0.is_empty() {
             match self.apply(&mut reader) {
-                Some(Item::Tick(time)) => now = Some(time),
-                Some(Item::Began(by)) => began = Some(by),
-                Some(Item::Exchange(has)) => has_sampled = has,
-                Some(Item::Value(name, value)) => values.push((name, value)),
-                Some(Item::Device) => {}
+                Some(InputItem::Tick { now: time, .. }) => now = Some(time),
+                Some(InputItem::Began(by)) => began = Some(by),
+                Some(InputItem::Exchange(has)) => has_sampled = has,
+                Some(InputItem::Value(name, value)) => values.push((name.to_owned(), value)),
+                Some(_) => {}
                 None => return Err("the inputs do not fit the devices of the graph".into()),
             }
         }
@@ -78,101 +83,33 @@ impl Engine {
         Ok(self.tick(now))
     }
 
-    /// Carries out the first item.
-    fn apply(&mut self, reader: &mut ByteReader<'_>) -> Option<Item> {
-        match reader.u8()? {
-            WORD => {
+    /// Carries out the first item. Returns it, or `None` if it does not fit.
+    fn apply<'b>(&mut self, reader: &mut ByteReader<'b>) -> Option<InputItem<'b>> {
+        let item = InputItem::read(reader)?;
+        match item {
+            InputItem::Word(word) => {
                 // A word without an effect had none in the recording either.
-                let _ = self.send(reader.text()?);
-                Some(Item::Device)
+                let _ = self.send(word);
             }
-            TICK => {
-                let (_, now, late) = (reader.u64()?, reader.i64()?, reader.i64()?);
+            InputItem::Tick { now, late } => {
                 let is_next = self.ticks() == 0 || now > self.now();
-                if !is_next || !is_time(now) || !is_time(late) {
+                if !is_next {
                     return None;
                 }
                 if late > 0 {
                     self.begin_late(late);
                 }
-                Some(Item::Tick(now))
             }
-            BEGAN => reader.i64().filter(|by| is_time(*by) && *by >= 0).map(Item::Began),
-            VALUE => {
-                let value = [reader.u64()?, reader.u64()?].map(f64::from_bits);
-                let is_finite = value.iter().all(|number| number.is_finite());
-                let name = reader.text()?.to_owned();
-                is_finite.then_some(Item::Value(name, value))
+            InputItem::Rest(device) => self.devices.get_mut(device)?.commands.rest(),
+            InputItem::Failure(device, why) => {
+                self.devices.get_mut(device)?.failed.get_or_insert(why.to_owned());
             }
-            EXCHANGE => Some(Item::Exchange(reader.u8()? != 0)),
-            REST => {
-                self.recorded(reader)?.commands.rest();
-                Some(Item::Device)
+            InputItem::Lease(device, refusal) => {
+                self.devices.get_mut(device)?.lease_lost = Some(refusal.map(str::to_owned));
             }
-            FAILURE => {
-                let device = self.recorded(reader)?;
-                device.failed.get_or_insert(reader.text()?.to_owned());
-                Some(Item::Device)
-            }
-            LEASE => {
-                let device = self.recorded(reader)?;
-                let refusal = if reader.u8()? != 0 { Some(reader.text()?.to_owned()) } else { None };
-                device.lease_lost = Some(refusal);
-                Some(Item::Device)
-            }
-            PORT => {
-                apply_port(self.recorded(reader)?, reader)?;
-                Some(Item::Device)
-            }
-            _ => None,
+            InputItem::Port(device) => read_port(&mut self.devices.get_mut(device)?.samples, reader)?,
+            InputItem::Began(_) | InputItem::Value(..) | InputItem::Exchange(_) => {}
         }
+        Some(item)
     }
-
-    /// Returns the device whose number comes next.
-    fn recorded(&mut self, reader: &mut ByteReader<'_>) -> Option<&mut DeviceSlot> {
-        self.devices.get_mut(usize::from(reader.u16()?))
-    }
-}
-
-/// Largest time of an input [ns], and largest sequence number: others are damaged, and sums of them would overflow.
-const MAX_TIME: u64 = 1 << 60;
-const MAX_SEQUENCE: u64 = 1 << 48;
-
-/// Whether a number can be a time [ns].
-const fn is_time(nanos: i64) -> bool {
-    nanos.unsigned_abs() < MAX_TIME
-}
-
-/// An item that was carried out.
-enum Item {
-    /// The time of the tick [ns].
-    Tick(i64),
-    /// How late it began in real time [ns].
-    Began(i64),
-    /// Whether the clock device has sampled.
-    Exchange(bool),
-    /// A parameter, its value and the value toward which it moves.
-    Value(String, [f64; 2]),
-    Device,
-}
-
-/// Writes a port of a device.
-fn apply_port(device: &mut DeviceSlot, reader: &mut ByteReader<'_>) -> Option<()> {
-    let samples = &mut device.samples;
-    let sample = samples.ports.get_mut(usize::from(reader.u16()?))?;
-    sample.state = STATES.get(usize::from(reader.u8()?))?.clone();
-    let has_value = reader.u8()? != 0;
-    sample.stamp = reader.i64()?;
-    (sample.sequence, sample.writes, sample.losses) = (reader.u64()?, reader.u64()?, reader.u64()?);
-    if !is_time(sample.stamp) || sample.sequence > MAX_SEQUENCE {
-        return None;
-    }
-    let loss = reader.text()?;
-    if !loss.is_empty() || sample.state == SampleState::Lost {
-        sample.loss = loss.to_owned().into();
-    }
-    if has_value {
-        samples.arenas.read_bytes(sample.kind, sample.slot, reader)?;
-    }
-    Some(())
 }

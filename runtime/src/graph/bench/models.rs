@@ -26,7 +26,8 @@ pub(crate) fn add_models(bench: &mut BenchDocument, catalogue: &Catalogue, diagn
             }
         }
         let Item::Table(params) = &mut block.params.item else { continue };
-        if table.entries.is_empty() && diagnostics.len() == before && !model.params.entries.is_empty() {
+        let takes_some = !table.entries.is_empty() || device.is_recorded();
+        if !takes_some && diagnostics.len() == before && !model.params.entries.is_empty() {
             let message = format!("a device of type `{}` takes nothing from a {what}", device.name());
             let diagnostic = Diagnostic::new(Code::UnknownKey, from.file.span.clone(), message);
             let does = if what == ROBOT { "drives" } else { "reads" };

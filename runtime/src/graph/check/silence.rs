@@ -22,10 +22,16 @@ pub(crate) fn check(opened: &OpenedBench, diagnostics: &mut Diagnostics) {
     }
 }
 
-/// Says for each live device that moves a role what it does without commands, within which time and way.
+/// Says what a run must know of the devices that move: what each live one does without commands, within which time and
+/// way, and what a device says itself.
 pub(crate) fn describe(net: &Net<'_>, opened: &OpenedBench) -> Vec<String> {
     let bound = opened.roles.iter().enumerate().filter_map(|(role, bound)| Some((role, bound.as_ref()?)));
-    let lines = bound.filter(|(_, bound)| !bound.commands.is_empty()).filter_map(|(role, bound)| {
+    let moved = || bound.clone().filter(|(_, bound)| !bound.commands.is_empty());
+    let notes = moved().flat_map(|(role, bound)| {
+        let name = net.name(Producer::Role(role));
+        opened.devices[bound.device].description.notes.iter().map(move |note| format!("`{name}` {note}"))
+    });
+    let lines = moved().filter_map(|(role, bound)| {
         let device = &opened.devices[bound.device];
         let silence = device.description.on_silence.as_ref().filter(|_| matches!(device.driver, Driver::Live(_)))?;
         let way = net.speed_limit(role).map(|speed| {
@@ -34,7 +40,7 @@ pub(crate) fn describe(net: &Net<'_>, opened: &OpenedBench) -> Vec<String> {
         let name = net.name(Producer::Role(role));
         Some(format!("`{name}` without commands: {silence}{}", way.unwrap_or_default()))
     });
-    lines.collect()
+    notes.chain(lines).collect()
 }
 
 /// Rounds a number to three decimals.
