@@ -121,6 +121,8 @@ class _Features:
 
 Image = _Image("image")
 """An image of a pad. An input is ``Image["N"]``, and an output ``Image("N", 16, 16, (0.005, 0.005))``."""
+VectorImage = _Kind("vector_image")
+"""A vector image of a pad with three axes, as an input: ``VectorImage["N"]``. Its cells have the axes row, column, [x, y, z]."""
 Features = _Features()
 """Features: an input is ``Features()``, and an output ``Features(x="m")``. Values are dictionaries; an absent one is None."""
 
@@ -130,7 +132,7 @@ class Frame:
     """An image of a pad, as an array without a copy. The array is read-only."""
 
     cells: np.ndarray
-    """The values, row by row: ``float32``."""
+    """The values, row by row: ``float32``. Those of a vector image have a third axis: x, y and z."""
     pitch: Tuple[float, float] = (1.0, 1.0)
     """Distance between the centres of two tactels along x and y [m]."""
     unit: str = "raw"
@@ -255,9 +257,10 @@ def _read_value(reader: _Reader, port: Port, shape: Dict[str, Any], stamp: int) 
         parts = [reader.take("Bd") for _ in range(count)]
         names = [part["name"] for part in shape.get("features", [])]
         return {name: (value if there else None) for name, (there, value) in zip(names, parts)}
-    if port.kind == "image":
+    if port.kind in ("image", "vector_image"):
         rows, cols = reader.take("II")
-        cells = reader.array("<f4", rows * cols).reshape(rows, cols)
+        size = (rows, cols) if port.kind == "image" else (rows, cols, 3)
+        cells = reader.array("<f4", int(np.prod(size))).reshape(size)
         pitch = tuple(shape.get("pitch", (1.0, 1.0)))
         return Frame(cells, pitch, _unit_text(shape.get("unit", "raw")), stamp)  # type: ignore[arg-type]
     if port.kind == "mask":
@@ -420,7 +423,7 @@ def _archived_inputs(what: Node, path: str, pitch: float) -> Dict[str, List[Any]
         raise SystemExit(f"{path} has no array {missing}; it has {archive.files}")
 
     def value(port: Port, one: Any) -> Any:
-        return Frame(np.asarray(one, np.float32), (pitch, pitch), port.unit or "raw") if port.kind == "image" else one
+        return Frame(np.asarray(one, np.float32), (pitch, pitch), port.unit or "raw") if port.kind in ("image", "vector_image") else one
 
     return {name: [value(port, one) for one in archive[name]] for name, port in what.inputs.items()}
 
@@ -438,7 +441,7 @@ def _recorded_inputs(what: Node, path: str, wires: Dict[str, str]) -> Dict[str, 
         if at < 0:
             return None
         one = port.values[at]
-        if port.kind == "image":
+        if port.kind in ("image", "vector_image"):
             return Frame(one, port.pitch or (1.0, 1.0), port.units[0], int(round(port.times[at] * 1e9)))
         return dict(zip(port.columns, (None if np.isnan(part) else part for part in one))) if port.kind == "features" else one
 
@@ -565,7 +568,7 @@ def open(path: str) -> Recording:  # noqa: A001
 
 def _values(kind: str, columns: List[str], messages: List[Dict[str, Any]]) -> np.ndarray:
     """Returns the values of a port as one array."""
-    if kind in ("image", "mask"):
+    if kind in ("image", "vector_image", "mask"):
         return np.stack([_grid(message) for message in messages])
     if kind == "flag":
         return np.array([message["value"] for message in messages], dtype=object)
@@ -580,10 +583,11 @@ def _values(kind: str, columns: List[str], messages: List[Dict[str, Any]]) -> np
 
 
 def _grid(message: Dict[str, Any]) -> np.ndarray:
-    """Returns the cells of an image or a mask, the first row first."""
+    """Returns the cells of an image, a vector image or a mask, the first row first."""
     import base64
 
     data, cols = base64.b64decode(message["data"]), message["column_count"]
-    kind = {1: np.uint8, 4: np.dtype("<f4")}[message["cell_stride"]]
-    cells = np.frombuffer(data, kind).reshape(-1, cols)
+    kind = np.uint8 if message["cell_stride"] == 1 else np.dtype("<f4")
+    axes = len(message["fields"])
+    cells = np.frombuffer(data, kind).reshape((-1, cols, axes) if axes > 1 else (-1, cols))
     return cells.astype(bool) if kind is np.uint8 else cells

@@ -57,6 +57,7 @@ fn edge() -> Catalogue {
     let catalogue = Catalogue::new()
         .files(builtin::FILES)
         .role(roles::tactile_pad())
+        .role(roles::three_axis_pad())
         .role(roles::velocity_arm())
         .role(roles::bare_arm())
         .role(roles::force_sensor())
@@ -93,8 +94,8 @@ fn edge() -> Catalogue {
     catalogue
 }
 
-/// Everything there is: one line each.
-pub fn catalogue() -> Catalogue {
+/// The nodes that measure a contact, after the edge: one line each.
+fn touch() -> Catalogue {
     edge()
         .group("touch: from a tactile image to features of the contact")
         .node::<touch::tactile_source::TactileSource>()
@@ -110,9 +111,18 @@ pub fn catalogue() -> Catalogue {
         .node::<touch::contact_area::ContactArea>()
         .node::<touch::hough::Hough>()
         .node::<touch::curvature::Curvature>()
+        .node::<touch::calibrate_vectors::CalibrateVectors>()
+        .node::<touch::normal_image::NormalImage>()
+        .node::<touch::shear::Shear>()
+        .node::<touch::friction_margin::FrictionMargin>()
         .node::<touch::moving_average::MovingAverage>()
         .node::<touch::low_pass::LowPass>()
         .node::<touch::median::Median>()
+}
+
+/// Everything there is: one line each.
+pub fn catalogue() -> Catalogue {
+    touch()
         .group("servo: from features to a twist of the sensor")
         .node::<servo::feature_error::FeatureError>()
         .node::<servo::deadband::Deadband>()

@@ -11,13 +11,32 @@ pub fn tactile_pad() -> RoleType {
     RoleType {
         name: "tactile_pad".into(),
         summary: "an array of tactels that outputs an image".into(),
+        outputs: vec![pad_image()],
+        filled_as: Some("three_axis_pad".into()),
+        ..RoleType::default()
+    }
+}
+
+/// An array of tactels that feel how the object drags them, beside how it presses them. It has the image of a
+/// [`tactile_pad`], so each task for such a pad runs on it too.
+pub fn three_axis_pad() -> RoleType {
+    RoleType {
+        name: "three_axis_pad".into(),
+        summary: "an array of tactels with three axes that outputs an image and a vector image".into(),
         outputs: vec![
-            PortSpec::new("image", "The newest image, in the device's unit.", Kind::Image, &["U", "self"])
-                .of_quantity("tactile_image"),
+            pad_image(),
+            PortSpec::new("vectors", VECTORS, Kind::VectorImage, &["V", "self"]).of_quantity("three_axis_image"),
         ],
         ..RoleType::default()
     }
 }
+
+fn pad_image() -> PortSpec {
+    PortSpec::new("image", "The newest image, in the device's unit.", Kind::Image, &["U", "self"])
+        .of_quantity("tactile_image")
+}
+
+const VECTORS: &str = "The newest vector image, of the same frame as the image, in the device's unit.";
 
 /// An arm that takes joint velocities.
 pub fn velocity_arm() -> RoleType {

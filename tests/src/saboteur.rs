@@ -9,7 +9,7 @@ use tactflow_runtime::node::{
     AnyNode, Built, Bus, Components, Configured, Given, Mistakes, NodeSpec, NodeType, ParamSpec, PortId, Reader, Tick,
     Wires,
 };
-use tactflow_runtime::signal::{Features, Image, Jacobian, Joints, Kind, Pose, Scalar, Signal, Twist};
+use tactflow_runtime::signal::{Features, Image, Jacobian, Joints, Kind, Pose, Scalar, Signal, Twist, VectorImage};
 use tactflow_runtime::source::Value;
 
 /// How the nodes fail.
@@ -158,6 +158,7 @@ fn spoil(bus: &mut Bus, kind: Kind, id: PortId, tick: &Tick) -> bool {
         Kind::Scalar => Scalar::arena_mut(arenas)[slot] = NAN,
         Kind::Features => Features::arena_mut(arenas)[slot].set(0, NAN, tick.index, tick.stamp),
         Kind::Image => Image::arena_mut(arenas)[slot].cells_mut()[0] = f32::NAN,
+        Kind::VectorImage => VectorImage::arena_mut(arenas)[slot].cells_mut()[0][2] = f32::NAN,
         Kind::Twist => Twist::arena_mut(arenas)[slot].0[0] = NAN,
         Kind::Pose => Pose::arena_mut(arenas)[slot].0.translation.vector.x = NAN,
         Kind::Joints => Joints::arena_mut(arenas)[slot].0[0] = NAN,

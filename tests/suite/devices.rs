@@ -13,6 +13,7 @@ use tactflow_runtime::harness::{FedRole, GraphRig};
 use tactflow_runtime::node::{ParamSpec, PortSpec, Reader};
 use tactflow_runtime::signal::{
     Features, FeaturesShape, Freshness, Image, ImageShape, Joints, JointsShape, Kind, Pose, Scalar, ScalarShape, Unit,
+    VectorImage, VectorImageShape,
 };
 use tactflow_runtime::source::Value;
 use tactflow_tests::nodes::length_by_hand;
@@ -200,6 +201,7 @@ fn sized() -> RoleType {
         summary: "a value of each kind that has a size".into(),
         outputs: vec![
             port("image", Kind::Image, &["U", "self"]),
+            port("vectors", Kind::VectorImage, &["U", "self"]),
             port("joints", Kind::Joints, &["rad", "self"]),
             port("offsets", Kind::Features, &["_", "self"]),
         ],
@@ -211,6 +213,7 @@ fn sized_rig(policy: &str) -> GraphRig {
     let feature = |name: &str| tactflow_runtime::signal::Feature { name: name.into(), unit: Unit::METRE };
     let fed = FedRole::new("s", "sized", 10.0)
         .output("image", ImageShape { rows: 2, cols: 3, pitch: [0.01; 2], unit: Unit::NEWTON })
+        .output("vectors", VectorImageShape(ImageShape { rows: 2, cols: 3, pitch: [0.01; 2], unit: Unit::NEWTON }))
         .output("joints", JointsShape { joints: vec![Default::default(); 2], unit: Unit::RADIAN })
         .output("offsets", FeaturesShape { features: vec![feature("x"), feature("y")] });
     let graph = format!("graph.clock = 's'\nroles.s = 'sized'\npolicy.device = '{policy}'\npolicy.clock = 'count'\n");
@@ -221,7 +224,7 @@ fn sized_rig(policy: &str) -> GraphRig {
 #[test]
 fn a_value_of_the_wrong_size_is_a_fault_of_the_device_that_names_the_port_and_both_sizes() {
     type Feed = fn(&mut GraphRig);
-    let cases: [(Feed, &str); 4] = [
+    let cases: [(Feed, &str); 5] = [
         (
             |rig| rig.feed("s.image", 0.0, Image::zeros(3, 2)),
             "`s.image` has 3 by 2 tactels, but the device stated 2 by 3 tactels",
@@ -229,6 +232,10 @@ fn a_value_of_the_wrong_size_is_a_fault_of_the_device_that_names_the_port_and_bo
         (
             |rig| rig.feed("s.image", 0.0, Image::zeros(2, 4)),
             "`s.image` has 2 by 4 tactels, but the device stated 2 by 3 tactels",
+        ),
+        (
+            |rig| rig.feed("s.vectors", 0.0, VectorImage::zeros(3, 3)),
+            "`s.vectors` has 3 by 3 tactels, but the device stated 2 by 3 tactels",
         ),
         (|rig| rig.feed("s.joints", 0.0, Joints::zeros(3)), "`s.joints` has 3 joints, but the device stated 2 joints"),
         (

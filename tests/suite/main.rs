@@ -100,6 +100,7 @@ mod task_folder;
 mod tasks;
 #[cfg(target_os = "linux")]
 mod teach;
+mod three_axes;
 mod tick;
 mod tidy;
 mod together;

@@ -101,7 +101,7 @@ fn the_runtime_knows_no_node_no_sensor_and_no_robot() {
 fn the_derives_know_every_kind_of_signal() {
     let port = fs::read_to_string(workspace().join("runtime/derive/src/port.rs")).unwrap();
     let (_, list) = port.split_once("const SIGNALS").unwrap();
-    // Behind the type `[&str; 12]`.
+    // Behind the type `[&str; 13]`.
     let list = list.split(';').nth(1).unwrap();
     let named: BTreeSet<&str> = list.split('"').skip(1).step_by(2).collect();
     let mut kinds: BTreeSet<String> = Kind::ALL.iter().map(|kind| format!("{kind:?}")).collect();

@@ -5,7 +5,9 @@ use std::path::Path;
 
 use tactflow_runtime::graph::{Compiled, Outline, Request, Setting, compile};
 use tactflow_runtime::node::{At, KnownUnits, Mistake, NodeSpec, ParamSpec, Reader};
-use tactflow_runtime::signal::{FeaturesShape, ImageShape, Kind, RegionsShape, ScalarShape, Shape, Unit};
+use tactflow_runtime::signal::{
+    FeaturesShape, ImageShape, Kind, RegionsShape, ScalarShape, Shape, Unit, VectorImageShape,
+};
 use tactflow_runtime::source::{Code, Item, SourceMap, Value, parse_table};
 use tactflow_tests::catalogue;
 
@@ -63,6 +65,7 @@ fn wires(spec: &NodeSpec) -> Vec<Vec<(String, Shape)>> {
             Kind::Features => FeaturesShape::new([("x", unit)]).into(),
             Kind::Regions => RegionsShape { unit, ..RegionsShape::default() }.into(),
             Kind::Image => ImageShape { unit, ..ImageShape::default() }.into(),
+            Kind::VectorImage => VectorImageShape(ImageShape { unit, ..ImageShape::default() }).into(),
             _ => ScalarShape::of(unit).into(),
         };
         vec![("x".to_owned(), shape)]

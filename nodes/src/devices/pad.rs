@@ -1,11 +1,11 @@
-//! What every pad states: the role `tactile_pad`, its image and its facts.
+//! What every pad states: the role `tactile_pad` or `three_axis_pad`, its images and its facts.
 
 use std::borrow::Cow;
 
 use tactflow_runtime::device::{Fill, Output};
 #[cfg(feature = "drivers")]
 use tactflow_runtime::node::{FilePath, Mistakes};
-use tactflow_runtime::signal::{Image, ImageShape, Unit};
+use tactflow_runtime::signal::{Image, ImageShape, Unit, VectorImage, VectorImageShape};
 
 use super::Facts;
 #[cfg(feature = "drivers")]
@@ -14,6 +14,20 @@ use crate::arm::mount::Mount;
 
 /// The type of the role of a pad.
 pub(crate) const ROLE: &str = "tactile_pad";
+
+/// The type of the role of a pad with three axes.
+pub(crate) const THREE_AXES: &str = "three_axis_pad";
+
+/// States what a pad with three axes gives in its role, each in the unit of the image. Returns the handles of its image and
+/// of its vector image.
+pub(crate) fn fill_three_axes(
+    mut pad: Fill<'_>,
+    shape: ImageShape,
+    facts: Facts,
+) -> (Output<Image>, Output<VectorImage>) {
+    pad.facts(facts);
+    (pad.output("image", shape.clone()), pad.output("vectors", VectorImageShape(shape)))
+}
 
 /// States what a pad gives in its role. Returns the handle of its image.
 pub(crate) fn fill(mut pad: Fill<'_>, shape: ImageShape, facts: Facts) -> Output<Image> {

@@ -8,7 +8,7 @@ use std::sync::Arc;
 
 use tactflow_runtime::device::{Commands, Description, Device, DeviceError, Driver, Opened, Output, Samples, Stepped};
 use tactflow_runtime::node::{At, Describe, FilePath, Mistake, Mistakes, Param};
-use tactflow_runtime::signal::{Image, Unit};
+use tactflow_runtime::signal::{Image, Unit, VectorImage};
 use tactflow_runtime::source::{Code, quoted};
 
 use super::{Facts, pad};
@@ -59,7 +59,7 @@ pub struct Params {
 /// - `zebris`: `RawDataGaitAnalysis` texts of Zebris treadmills and plates
 /// - `xsensor`: `.csv` of XSENSOR
 /// - `csv`: plain tables with one frame per row or one frame per block
-/// - `npy`, `npz`: arrays of numpy, frames x rows x columns
+/// - `npy`, `npz`: arrays of numpy, frames x rows x columns; with 3 values for each tactel the pad has three axes
 /// - `mcap`: a recording of a whole run, as `run --record` writes it; another graph then runs on the pad of that run
 ///
 /// Any of them may be in a `.zip` or `.gz`. Pressures are converted to kPa, and forces to N.
@@ -90,6 +90,8 @@ pub struct Params {
 #[describe(name = "recording")]
 pub struct Player {
     image: Output<Image>,
+    /// The vector image of a pad with three axes.
+    vectors: Option<Output<VectorImage>>,
     recording: Recording,
     next: usize,
 }
@@ -104,8 +106,14 @@ impl Device for Player {
         let recording = recordings::read(&bytes, &file.path.to_string_lossy(), &hints)
             .map_err(|refusal| mistakes(refusal, file, &bytes))?;
         let mut description = Description::every(recording.period);
-        let image = pad::fill(description.fills(pad::ROLE), recording.shape.clone(), facts(&recording, &params));
-        Ok(Opened { description, driver: Driver::Stepped(Box::new(Self { image, recording, next: 0 })) })
+        let (shape, facts) = (recording.shape.clone(), facts(&recording, &params));
+        let (image, vectors) = if recording.drag.is_empty() {
+            (pad::fill(description.fills(pad::ROLE), shape, facts), None)
+        } else {
+            let (image, vectors) = pad::fill_three_axes(description.fills(pad::THREE_AXES), shape, facts);
+            (image, Some(vectors))
+        };
+        Ok(Opened { description, driver: Driver::Stepped(Box::new(Self { image, vectors, recording, next: 0 })) })
     }
 }
 
@@ -191,6 +199,10 @@ impl Stepped for Player {
             let newest = self.next - 1;
             let frame = self.recording.frames[newest];
             self.recording.show(newest, samples.write(self.image, frame.time, frame.number).cells_mut());
+            if let Some(vectors) = self.vectors {
+                let vectors = samples.write(vectors, frame.time, frame.number).cells_mut();
+                self.recording.show_vectors(newest, vectors);
+            }
         }
         Ok(())
     }

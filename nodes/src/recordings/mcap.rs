@@ -48,7 +48,8 @@ fn read(bytes: &[u8], hints: &Hints) -> Result<Recording, Refusal> {
     }
     let shape = tactflow_runtime::signal::ImageShape { rows, cols, pitch, unit };
     let threshold = pad.facts.get("threshold").and_then(toml::Value::as_float);
-    Ok(Recording { format: FORMAT.name, shape, frames, cells, dead, threshold, period, force: pad.beside })
+    let (drag, force) = (Vec::new(), pad.beside);
+    Ok(Recording { format: FORMAT.name, shape, frames, cells, drag, dead, threshold, period, force })
 }
 
 /// Returns the indices of the tactels that the pad states as dead, as `[row, column]`.

@@ -152,6 +152,13 @@ impl Contact {
         self.tactels.iter().map(|tactel| tactel.friction).sum()
     }
 
+    /// Returns the share of a point in the friction of its tactel, along the pad's x and y [N]: that of its force.
+    #[must_use]
+    pub fn friction_at(&self, touch: &Touch) -> Vec2 {
+        let tactel = &self.tactels[touch.tactel];
+        if tactel.normal > 0.0 { tactel.friction * (touch.force / tactel.normal) } else { Vec2::ZERO }
+    }
+
     /// Returns the force along the pad's z, positive when the pad is pressed, as of the last step [N].
     #[must_use]
     pub fn normal(&self) -> f64 {

@@ -3,9 +3,11 @@
 use std::collections::VecDeque;
 
 use tactflow_runtime::device::{Output, Samples};
-use tactflow_runtime::signal::Image;
+use tactflow_runtime::signal::{Image, VectorImage};
 
+use super::imprint::Forces;
 use super::readout::Readout;
+use super::vector_readout::VectorReadout;
 
 /// The times at which a simulation takes images.
 #[derive(Debug, Clone)]
@@ -63,13 +65,23 @@ impl Beats {
 pub struct Frames {
     image: Output<Image>,
     readout: Readout,
+    /// The second electronics of a pad with three axes.
+    vectors: Option<(Output<VectorImage>, VectorReadout)>,
     latency: i64,
     /// Images that are taken but not yet available, with their stamps.
-    taken: VecDeque<(i64, Vec<f32>)>,
+    taken: VecDeque<(i64, Frame)>,
     /// Buffers for further images.
-    spare: Vec<Vec<f32>>,
+    spare: Vec<Frame>,
     /// Number of images that were handed over.
     shown: u64,
+}
+
+/// The counts of the tactels.
+#[derive(Debug, Clone)]
+struct Frame {
+    counts: Vec<f32>,
+    /// Empty for a pad with one axis.
+    vectors: Vec<[f32; 3]>,
 }
 
 impl Frames {
@@ -81,11 +93,21 @@ impl Frames {
         Self {
             image,
             readout,
+            vectors: None,
             latency,
             taken: VecDeque::with_capacity(frames),
-            spare: vec![vec![0.0; tactels]; frames],
+            spare: vec![Frame { counts: vec![0.0; tactels], vectors: Vec::new() }; frames],
             shown: 0,
         }
+    }
+
+    /// Adds the vector images of a pad with three axes.
+    #[must_use]
+    pub fn with_vectors(mut self, vectors: Option<(Output<VectorImage>, VectorReadout)>) -> Self {
+        if vectors.is_some() {
+            self.spare.iter_mut().for_each(|frame| frame.vectors.resize(frame.counts.len(), [0.0; 3]));
+        }
+        Self { vectors, ..self }
     }
 
     /// Returns the electronics.
@@ -94,24 +116,30 @@ impl Frames {
         &self.readout
     }
 
-    /// Takes an image of these `forces` [N] at `stamp` [ns], one `period` [ns] after the one before.
-    pub fn take(&mut self, stamp: i64, period: i64, forces: &[f64]) {
-        let mut counts = match self.spare.pop() {
+    /// Takes an image of these `forces` at `stamp` [ns], one `period` [ns] after the one before.
+    pub fn take(&mut self, stamp: i64, period: i64, forces: &Forces) {
+        let mut frame = match self.spare.pop() {
             Some(room) => room,
             // No buffer is free, so the oldest image, which was never read, is dropped.
             None => self.taken.pop_front().expect("all buffers are in `taken`").1,
         };
-        self.readout.read(period as f64 * 1e-9, forces, &mut counts);
-        self.taken.push_back((stamp, counts));
+        self.readout.read(period as f64 * 1e-9, &forces.normal, &mut frame.counts);
+        if let Some((_, readout)) = &mut self.vectors {
+            readout.read(forces, &mut frame.vectors);
+        }
+        self.taken.push_back((stamp, frame));
     }
 
     /// Hands over the images that are available at `now` [ns].
     pub fn show(&mut self, now: i64, samples: &mut Samples) {
         while self.taken.front().is_some_and(|(stamp, _)| stamp + self.latency <= now) {
-            let (stamp, counts) = self.taken.pop_front().expect("the front was just checked");
+            let (stamp, frame) = self.taken.pop_front().expect("the front was just checked");
             self.shown += 1;
-            samples.write(self.image, stamp, self.shown).cells_mut().copy_from_slice(&counts);
-            self.spare.push(counts);
+            samples.write(self.image, stamp, self.shown).cells_mut().copy_from_slice(&frame.counts);
+            if let Some((output, _)) = &self.vectors {
+                samples.write(*output, stamp, self.shown).cells_mut().copy_from_slice(&frame.vectors);
+            }
+            self.spare.push(frame);
         }
     }
 }

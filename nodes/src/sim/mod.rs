@@ -6,7 +6,7 @@
 //! | [`shape`], [`object`] | the objects |
 //! | [`foam`], [`bristle`], [`contact`], [`imprint`], [`wrench`] | the pad: forces on each tactel |
 //! | [`housing`] | what else of the tool touches objects |
-//! | [`readout`], [`frames`] | the electronics: counts from forces, and when an image is available |
+//! | [`readout`], [`vector_readout`], [`frames`] | the electronics: counts from forces, and when an image is available |
 //! | [`joints`] | the arm |
 //! | [`pad_model`], [`arm_model`], [`steps`] | parameters of pad and arm, and what can be simulated of them |
 //! | [`world`] | all of them on a bench, stepped together |
@@ -34,6 +34,7 @@ pub mod shape;
 pub mod steps;
 pub mod survey;
 pub mod truth;
+pub mod vector_readout;
 pub mod world;
 pub mod wrench;
 

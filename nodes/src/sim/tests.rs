@@ -81,7 +81,7 @@ fn at_rest_the_prismatic_joint_and_the_foam_balance() {
         let wanted = 5000.0 * (0.01 - 0.002) / (1.0 + 5000.0 / stiffness);
         let force = world.truth(0.015).force;
         assert!((force - wanted).abs() < 1e-3 * wanted, "{force} N, not {wanted} N");
-        let clean: f64 = world.image().iter().sum();
+        let clean: f64 = world.forces().normal.iter().sum();
         assert!((clean - force).abs() < 1e-9, "the image has the whole force: {clean}");
     }
 }
@@ -322,14 +322,38 @@ fn the_imprint_keeps_the_sum_and_the_centre_of_a_load() {
         let objects = [object(&ball(0.003, [x, y, 0.003]))];
         let mut contact = Contact::new(shape(), Foam::default(), 0.001, 8);
         contact.step(0.001, &pad(0.002), &objects, &mut [Wrench::default()]);
-        imprint.take(&contact.touching);
-        let clean = &imprint.forces;
+        imprint.take(&contact);
+        let clean = &imprint.forces.normal;
         let sum: f64 = clean.iter().sum();
         assert!((sum - contact.normal()).abs() < 1e-9 * sum, "at ({x}, {y})");
         let at = |index: usize| [shape().x((index % 16) as f64), shape().y((index / 16) as f64)];
         let moment = |axis: usize| clean.iter().enumerate().map(|(i, f)| f * at(i)[axis]).sum::<f64>() / sum;
         if x.abs() < 0.02 {
             assert!((moment(0) - x).abs() < 2e-4 && (moment(1) - y).abs() < 2e-4, "({}, {})", moment(0), moment(1));
+        }
+    }
+}
+
+#[test]
+fn drag_is_spread_as_the_force_that_causes_it() {
+    let mut imprint = Imprint::new(&shape(), 5, 0.003).with_drag();
+    let objects = [object(&ball(0.04, [0.0123, -0.0087, 0.040]))];
+    let mut contact = Contact::new(shape(), Foam::default(), 0.001, 8);
+    // First it sticks, then it slips.
+    for (steps, speed) in [(100, 1e-3), (2000, 0.02)] {
+        for _ in 0..steps {
+            let moving = BodyMotion { linear: Vec3::new(0.6, 0.8, 0.0) * speed, ..pad(0.003) };
+            contact.step(0.001, &moving, &objects, &mut [Wrench::default()]);
+        }
+        imprint.take(&contact);
+        let [x, y] = imprint.forces.drag.as_ref().unwrap();
+        let normal = &imprint.forces.normal;
+        let friction = contact.friction();
+        let sum = |forces: &[f64]| forces.iter().sum::<f64>();
+        assert!((sum(x) - friction.x).abs() < 1e-9 && (sum(y) - friction.y).abs() < 1e-9, "{friction}");
+        assert!(friction.x < -0.05 && friction.y < 1.3 * friction.x, "against the motion: {friction}");
+        for ((x, y), normal) in x.iter().zip(y).zip(normal) {
+            assert!(x.hypot(*y) <= 0.4 * normal + 1e-12, "within the cone: {x} {y} {normal}");
         }
     }
 }

@@ -36,16 +36,17 @@ pub struct Truth {
 impl World {
     /// Returns the ground truth now; tactels count above `threshold` [N].
     pub fn truth(&mut self, threshold: f64) -> Truth {
-        self.image();
+        self.forces();
         let Self { contact, shape, imprint, .. } = &*self;
+        let forces = &imprint.forces.normal;
         let force = contact.normal();
-        let pressed = || imprint.forces.iter().filter(|cell| **cell > threshold);
+        let pressed = || forces.iter().filter(|cell| **cell > threshold);
         let tactels = pressed().count();
         let area = shape.pitch[0] * shape.pitch[1] / (contact.fine * contact.fine) as f64;
         Truth {
             force,
             tangential: contact.friction().length(),
-            peak: imprint.forces.iter().fold(0.0, |peak: f64, cell| peak.max(*cell)),
+            peak: forces.iter().fold(0.0, |peak: f64, cell| peak.max(*cell)),
             middle: middle(contact, force),
             pressure: (tactels > 0).then(|| pressed().sum::<f64>() / tactels as f64),
             tactels,

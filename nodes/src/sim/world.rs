@@ -7,7 +7,7 @@ use tactflow_runtime::signal::ImageShape;
 use super::contact::Contact;
 use super::foam::Foam;
 use super::housing::Housing;
-use super::imprint::Imprint;
+use super::imprint::{Forces, Imprint};
 use super::joints::SimArm;
 use super::object::Object;
 use super::survey::{Measured, Survey, measure};
@@ -67,6 +67,12 @@ impl World {
         }
     }
 
+    /// Computes the friction on each tactel too, if the pad `has_drag`.
+    #[must_use]
+    pub fn with_drag(self, has_drag: bool) -> Self {
+        if has_drag { Self { imprint: self.imprint.with_drag(), ..self } } else { self }
+    }
+
     /// Adds the housing of the pad.
     #[must_use]
     pub fn with_housing(self, housing: Option<Housing>) -> Self {
@@ -123,10 +129,10 @@ impl World {
             && self.objects.iter().all(|object| is_near(object.sag) && is_near(object.tilt))
     }
 
-    /// Returns the noise-free image [N].
-    pub fn image(&mut self) -> &[f64] {
+    /// Returns the noise-free forces on the tactels.
+    pub fn forces(&mut self) -> &Forces {
         if std::mem::take(&mut self.is_stale) {
-            self.imprint.take(&self.contact.touching);
+            self.imprint.take(&self.contact);
         }
         &self.imprint.forces
     }

@@ -18,8 +18,21 @@ const OUTPUT_WORDS: &[&str] = &["unit", "frame", "reference", "robot", QUANTITY]
 const INPUT_FORMS: &str = "an input is `In<'a, T>`, `Option<In<'a, T>>` or `Many<'a, T>`, where `T` is a signal";
 
 /// The closed set of signals, and the types that the first two stand for.
-const SIGNALS: [&str; 12] =
-    ["Scalar", "Flag", "Features", "Image", "Mask", "Regions", "Twist", "Pose", "Joints", "Jacobian", "f64", "bool"];
+const SIGNALS: [&str; 13] = [
+    "Scalar",
+    "Flag",
+    "Features",
+    "Image",
+    "VectorImage",
+    "Mask",
+    "Regions",
+    "Twist",
+    "Pose",
+    "Joints",
+    "Jacobian",
+    "f64",
+    "bool",
+];
 
 /// How a port is declared.
 #[derive(Clone, Copy, PartialEq, Eq)]

@@ -11,7 +11,7 @@ use super::text::number::milliseconds;
 use crate::graph::{
     Compiled, NO_SPAN, OutlinedBlock, OutlinedWire, OutlinedWord, PlannedPort, Setting, ValueOrigin, compile,
 };
-use crate::signal::Shape;
+use crate::signal::{Shape, VectorImageShape};
 use crate::source::{Item, Key, Location, SourceMap, Value};
 
 /// Print a graph as it runs: every wire and every value, each with the file and line it comes from
@@ -181,7 +181,7 @@ fn carried(port: &PlannedPort) -> String {
     let name = port.name.rsplit_once('.').map_or(port.name.as_str(), |(_, name)| name);
     let unit = port.shape.unit().map(|unit| format!(" [{unit}]")).unwrap_or_default();
     let shape = match &port.shape {
-        Shape::Image(shape) => {
+        Shape::Image(shape) | Shape::VectorImage(VectorImageShape(shape)) => {
             format!(", {} x {}, pitch {} m x {} m", shape.rows, shape.cols, shape.pitch[0], shape.pitch[1])
         }
         Shape::Mask(grid) => format!(", {} x {}", grid.rows, grid.cols),

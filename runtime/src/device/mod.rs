@@ -59,7 +59,7 @@ pub struct RoleType {
     /// Whether only scenarios and recordings may read it: a simulation knows its values, and no sensor does. A bench
     /// binds it under its name, or under one that ends with the last word of it, and no task declares it.
     pub is_observed: bool,
-    /// Another type with the same ports: a device that fills it fills this one as well. The two differ in their limits.
+    /// Another type that has at least the ports of this one: a device that fills it fills this one as well.
     pub filled_as: Option<Cow<'static, str>>,
 }
 

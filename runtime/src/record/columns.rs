@@ -24,7 +24,7 @@ pub struct PortColumns {
 }
 
 impl PortColumns {
-    /// Returns the columns of `ports`. Images, masks, regions and Jacobians have none.
+    /// Returns the columns of `ports`. Images, vector images, masks, regions and Jacobians have none.
     #[must_use]
     pub fn new(ports: &[(PlannedPort, PortId)]) -> Self {
         let mut columns = Self::default();
@@ -88,7 +88,7 @@ pub const fn recorded(kind: Kind) -> &'static str {
         Kind::Twist => "the columns `vx` `vy` `vz` [m/s] and `wx` `wy` `wz` [rad/s]",
         Kind::Pose => "the columns `x` `y` `z` [m] and the quaternion `qx` `qy` `qz` `qw`",
         Kind::Joints => "a column for each joint, by its name",
-        Kind::Image | Kind::Mask | Kind::Regions | Kind::Jacobian => "not at all",
+        Kind::Image | Kind::VectorImage | Kind::Mask | Kind::Regions | Kind::Jacobian => "not at all",
     }
 }
 
@@ -97,16 +97,17 @@ mod tests {
     use super::*;
     use crate::signal::{
         Feature, FeaturesShape, FlagShape, ImageShape, JacobianShape, Joint, JointsShape, MaskShape, PoseShape,
-        RegionsShape, ScalarShape, TwistShape,
+        RegionsShape, ScalarShape, TwistShape, VectorImageShape,
     };
 
     #[test]
     fn the_description_of_a_kind_matches_its_columns() {
-        let shapes: [Shape; 10] = [
+        let shapes: [Shape; 11] = [
             ScalarShape::default().into(),
             FlagShape.into(),
             FeaturesShape { features: vec![Feature::default()] }.into(),
             ImageShape::default().into(),
+            VectorImageShape::default().into(),
             MaskShape::default().into(),
             RegionsShape::default().into(),
             TwistShape.into(),

@@ -259,7 +259,7 @@ fn schema(port: &PlannedPort) -> Schema {
     let name = format!("tactflow.{}", port.name);
     let describe = |unit: String| format!("{} of `{}` [{unit}]", port.shape.kind(), port.name);
     match &port.shape {
-        Shape::Image(_) | Shape::Mask(_) => Schema::grid(),
+        Shape::Image(_) | Shape::VectorImage(_) | Shape::Mask(_) => Schema::grid(),
         Shape::Pose(_) => Schema::pose_in_frame(),
         Shape::Flag(_) => {
             let value = serde_json::json!({"type": ["boolean", "null"], "description": "null while it is absent"});

@@ -197,12 +197,21 @@ fn add(name: &str, value: &Value, parts: &mut BTreeMap<String, Leaf>) {
 fn cells(message: &serde_json::Map<String, Value>) -> Option<Vec<(String, Leaf)>> {
     let columns = message.get("column_count")?.as_u64()?.max(1) as usize;
     let values = grid_values(message)?;
-    let cell =
-        |(i, value): (usize, f32)| (format!("row {}, column {}", i / columns, i % columns), Leaf::Number(value.into()));
+    let axes = grid_fields(message);
+    let cell = |(i, value): (usize, f32)| {
+        let (tactel, axis) = (i / axes, ["x", "y", "z"].get(i % axes).filter(|_| axes > 1));
+        let place = format!("row {}, column {}", tactel / columns, tactel % columns);
+        (axis.map_or(place.clone(), |axis| format!("{place}, {axis}")), Leaf::Number(value.into()))
+    };
     Some(values.into_iter().enumerate().map(cell).collect())
 }
 
-/// Returns the values of a grid, row by row.
+/// Returns the number of fields of each cell of a grid: 3 of a vector image, 1 of other images.
+pub(super) fn grid_fields(message: &serde_json::Map<String, Value>) -> usize {
+    message.get("fields").and_then(Value::as_array).map_or(1, Vec::len).max(1)
+}
+
+/// Returns the values of a grid, row by row, and field by field in each cell.
 pub(super) fn grid_values(message: &serde_json::Map<String, Value>) -> Option<Vec<f32>> {
     let bytes = base64(message.get("data")?.as_str()?)?;
     Some(match message.get("cell_stride")?.as_u64()? {

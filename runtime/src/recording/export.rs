@@ -8,7 +8,7 @@ use rawzip::ZipArchiveWriter;
 use serde_json::{Map, Value, json};
 
 use super::channels::LOST;
-use super::compare::grid_values;
+use super::compare::{grid_fields, grid_values};
 use super::reader::Recording;
 use super::table::{Table, lost_port};
 use crate::record::{RecordFormat, file_seconds, mode_line};
@@ -131,7 +131,7 @@ fn about(recording: &Recording, table: &Table) -> Value {
     })
 }
 
-/// Adds the images of a port: ticks by rows by columns. They are read from the file once more, so that they need not fit
+/// Adds the images of a port: ticks by rows by columns, and by 3 for a vector image. They are read from the file once more, so that they need not fit
 /// into memory.
 fn add_images(
     archive: &mut ZipArchiveWriter<BufWriter<File>>,
@@ -148,9 +148,9 @@ fn add_images(
     while let Some(tick) = open.next_tick()?.filter(|_| size.is_none()) {
         size = tick.messages.iter().find(|(id, ..)| *id == channel).and_then(|(.., data)| grid_size(data));
     }
-    let [rows, cols] = size.unwrap_or([0, 0]);
-    last.resize(rows * cols, f32::NAN);
-    let header = npy_header("<f4", &[ticks, rows, cols]);
+    let size = size.unwrap_or(vec![0, 0]);
+    last.resize(size.iter().product(), f32::NAN);
+    let header = npy_header("<f4", &[&[ticks], &size[..]].concat());
     let write = |file: &mut dyn Write| {
         file.write_all(&header)?;
         for _ in 0..ticks {
@@ -181,11 +181,13 @@ fn update(recording: &Recording, tick: &super::reader::RecordedTick, (channel, n
     }
 }
 
-/// Returns the rows and columns of a grid.
-fn grid_size(data: &[u8]) -> Option<[usize; 2]> {
+/// Returns the rows and columns of a grid, and the fields of a cell if it has several.
+fn grid_size(data: &[u8]) -> Option<Vec<usize>> {
     let message: Map<String, Value> = serde_json::from_slice(data).ok()?;
     let columns = message.get("column_count")?.as_u64()? as usize;
-    Some([grid_values(&message)?.len().checked_div(columns)?, columns])
+    let fields = grid_fields(&message);
+    let rows = grid_values(&message)?.len().checked_div(columns * fields)?;
+    Some([&[rows, columns], &[fields][..usize::from(fields > 1)]].concat())
 }
 
 /// Adds a file to an archive.

@@ -4,7 +4,7 @@ use std::fmt::Write;
 
 use super::schema::{ORIENTATION, POSITION};
 use crate::record::seconds_text;
-use crate::signal::{Arenas, Flag, Image, Jacobian, Kind, Mask, Regions, Shape, Signal};
+use crate::signal::{Arenas, Flag, Image, Jacobian, Kind, Mask, Regions, Shape, Signal, VectorImage, VectorImageShape};
 
 /// What the JSON of a port contains besides its value.
 pub(crate) struct PortText {
@@ -58,7 +58,7 @@ impl PortText {
 
     /// Whether the schema of the port can say that it is absent.
     pub(crate) fn has_null(kind: Kind) -> bool {
-        !matches!(kind, Kind::Image | Kind::Mask | Kind::Pose)
+        !matches!(kind, Kind::Image | Kind::VectorImage | Kind::Mask | Kind::Pose)
     }
 
     /// Writes the value in a slot, or that there is none, at a time of the graph \[ns\] and of the file \[ns\].
@@ -67,13 +67,18 @@ impl PortText {
             (Shape::Image(shape), Some(slot)) => {
                 let image = &Image::arena(arenas)[slot as usize];
                 let cells = image.cells().iter().flat_map(|cell| cell.to_le_bytes());
-                self.grid(shape.pitch, [image.rows(), image.cols()], ("value", 4, 7), cells, time, out);
+                self.grid(shape.pitch, [image.rows(), image.cols()], (&["value"], 4, 7), cells, time, out);
+            }
+            (Shape::VectorImage(VectorImageShape(shape)), Some(slot)) => {
+                let image = &VectorImage::arena(arenas)[slot as usize];
+                let cells = image.cells().iter().flatten().flat_map(|value| value.to_le_bytes());
+                self.grid(shape.pitch, [image.rows(), image.cols()], (&["x", "y", "z"], 4, 7), cells, time, out);
             }
             (Shape::Mask(shape), Some(slot)) => {
                 let mask = &Mask::arena(arenas)[slot as usize];
                 let (rows, cols) = (mask.rows(), mask.cols());
                 let cells = (0..rows).flat_map(|i| (0..cols).map(move |j| u8::from(mask.contains(i, j))));
-                self.grid(shape.pitch, [rows, cols], ("mask", 1, 1), cells, time, out);
+                self.grid(shape.pitch, [rows, cols], (&["mask"], 1, 1), cells, time, out);
             }
             (Shape::Pose(_), Some(slot)) => {
                 arenas.read_scalars(Kind::Pose, slot, 0, &mut self.row);
@@ -126,17 +131,19 @@ impl PortText {
         out.push('}');
     }
 
-    /// Writes a grid whose middle is the origin of its frame. `field` is the name, the size and the type of a cell.
+    /// Writes a grid whose middle is the origin of its frame. `fields` are the names of the
+    /// fields of a cell, and the size and the type of each.
     fn grid(
         &self,
         pitch: [f64; 2],
         [rows, cols]: [usize; 2],
-        field: (&str, usize, u8),
+        fields: (&[&str], usize, u8),
         cells: impl Iterator<Item = u8>,
         time: i64,
         out: &mut String,
     ) {
-        let (name, size, code) = field;
+        let (names, size, code) = fields;
+        let stride = names.len() * size;
         out.push('{');
         put_timestamp(out, time);
         let _ = write!(out, ",\"frame_id\":{},\"pose\":{{", self.frame);
@@ -146,8 +153,13 @@ impl PortText {
         put_vector(out, ORIENTATION, &["x", "y", "z", "w"], &[0.0, 0.0, 0.0, 1.0]);
         let _ = write!(out, "}},\"column_count\":{cols},");
         put_vector(out, "cell_size", &["x", "y"], &pitch);
-        let _ = write!(out, ",\"row_stride\":{},\"cell_stride\":{size},", cols * size);
-        let _ = write!(out, "\"fields\":[{{\"name\":\"{name}\",\"offset\":0,\"type\":{code}}}],\"data\":\"");
+        let _ = write!(out, ",\"row_stride\":{},\"cell_stride\":{stride},", cols * stride);
+        out.push_str("\"fields\":[");
+        for (i, name) in names.iter().enumerate() {
+            let comma = if i > 0 { "," } else { "" };
+            let _ = write!(out, "{comma}{{\"name\":\"{name}\",\"offset\":{},\"type\":{code}}}", i * size);
+        }
+        out.push_str("],\"data\":\"");
         put_base64(out, cells);
         out.push_str("\"}");
     }

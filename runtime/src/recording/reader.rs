@@ -260,7 +260,7 @@ impl RecordedChannel {
     /// Whether it is that of an image or a mask.
     #[must_use]
     pub fn is_image(&self) -> bool {
-        matches!(self.kind.as_str(), "image" | "mask")
+        matches!(self.kind.as_str(), "image" | "vector_image" | "mask")
     }
 
     /// Returns the name of its port, or its topic.

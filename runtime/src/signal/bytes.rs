@@ -6,6 +6,7 @@
 //! | flag | u8 |
 //! | features | u32 count; for each u8 present, f64 |
 //! | image | u32 rows, u32 columns; f32 for each tactel, row by row |
+//! | vector image | u32 rows, u32 columns; 3 f32 for each tactel, row by row |
 //! | mask | u32 rows, u32 columns; the u64 words of each row |
 //! | regions | u32 runs, u32 regions; u16 row, start, end, region for each run; u32 area, f64 force for each region |
 //! | twist | 6 f64: linear, angular |
@@ -17,7 +18,7 @@ use nalgebra::{Matrix3, Rotation3, Translation3, Vector6};
 
 use super::{
     Arenas, Features, Flag, Image, Jacobian, Joints, Kind, Mask, Pose, Region, Regions, Run, Scalar, Shape, Signal,
-    Twist,
+    Twist, VectorImage,
 };
 
 /// Reads numbers from the front of bytes. Every method returns `None` when too few are left.
@@ -124,6 +125,12 @@ impl Arenas {
                 put_count(out, image.cols());
                 out.extend_from_slice(bytemuck::cast_slice(image.cells()));
             }
+            Kind::VectorImage => {
+                let image = &VectorImage::arena(self)[slot];
+                put_count(out, image.rows());
+                put_count(out, image.cols());
+                out.extend_from_slice(bytemuck::cast_slice(image.cells()));
+            }
             Kind::Mask => {
                 let mask = &Mask::arena(self)[slot];
                 put_count(out, mask.rows());
@@ -166,6 +173,7 @@ impl Arenas {
                 Features::arena_mut(self)[slot].fill(&values);
             }
             Kind::Image => read_image(&mut Image::arena_mut(self)[slot], bytes)?,
+            Kind::VectorImage => read_vector_image(&mut VectorImage::arena_mut(self)[slot], bytes)?,
             Kind::Mask => {
                 let (rows, cols) = bytes.size(|rows, cols| rows.checked_mul(8 * cols.div_ceil(64)))?;
                 let mask = &mut Mask::arena_mut(self)[slot];
@@ -244,6 +252,18 @@ fn read_image(image: &mut Image, bytes: &mut ByteReader<'_>) -> Option<()> {
     Some(())
 }
 
+fn read_vector_image(image: &mut VectorImage, bytes: &mut ByteReader<'_>) -> Option<()> {
+    let (rows, cols) = bytes.size(|rows, cols| rows.checked_mul(cols)?.checked_mul(12))?;
+    if (image.rows(), image.cols()) != (rows, cols) {
+        *image = VectorImage::zeros(rows, cols);
+    }
+    let cells = bytes.take(12 * rows * cols)?;
+    for (value, bytes) in image.cells_mut().as_flattened_mut().iter_mut().zip(cells.chunks_exact(4)) {
+        *value = f32::from_le_bytes(bytes.try_into().ok()?);
+    }
+    Some(())
+}
+
 impl Shape {
     /// Returns the number of bytes of the longest value of this shape.
     pub(crate) fn max_bytes(&self) -> usize {
@@ -262,7 +282,7 @@ impl Shape {
 mod tests {
     use super::super::{
         Feature, FeaturesShape, FlagShape, ImageShape, JacobianShape, Joint, JointsShape, MaskShape, PoseShape,
-        RegionsShape, ScalarShape, Stamp, TwistShape,
+        RegionsShape, ScalarShape, Stamp, TwistShape, VectorImageShape,
     };
     use super::*;
 
@@ -275,6 +295,7 @@ mod tests {
             FlagShape.into(),
             FeaturesShape { features: vec![Feature::default(); 2] }.into(),
             ImageShape { rows: 2, cols: 3, ..ImageShape::default() }.into(),
+            VectorImageShape(ImageShape { rows: 2, cols: 3, ..ImageShape::default() }).into(),
             grid.clone().into(),
             RegionsShape { grid, ..RegionsShape::default() }.into(),
             TwistShape.into(),
@@ -290,6 +311,7 @@ mod tests {
         Flag::arena_mut(&mut arenas)[0] = true;
         Features::arena_mut(&mut arenas)[0].set(1, 0.1, 7, Stamp::TIMELESS);
         Image::arena_mut(&mut arenas)[0].cells_mut()[4] = 0.3;
+        VectorImage::arena_mut(&mut arenas)[0].cells_mut()[5] = [0.0, -0.1, 0.3];
         Mask::arena_mut(&mut arenas)[0].insert(2, 69);
         let (runs, regions) = Regions::arena_mut(&mut arenas)[0].parts_mut();
         runs.push(Run { row: 2, start: 3, end: 69, region: 0 });

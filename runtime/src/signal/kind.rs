@@ -8,7 +8,7 @@ use super::spatial::NoProperties;
 use super::unit::is_same;
 use super::{
     Features, FeaturesShape, Grid, Image, ImageShape, Jacobian, Joints, JointsShape, Mark, Mask, Pose, PoseShape,
-    Regions, RegionsShape, Stamp, Twist, TwistShape, Unit, all_finite,
+    Regions, RegionsShape, Stamp, Twist, TwistShape, Unit, VectorImage, VectorImageShape, all_finite,
 };
 
 /// A single number.
@@ -65,7 +65,7 @@ impl From<NoProperties> for FlagShape {
 /// A value on a wire. Each kind has one type.
 #[diagnostic::on_unimplemented(
     message = "`{Self}` is not a signal",
-    note = "signals are `Scalar`, `Flag`, `Features`, `Image`, `Mask`, `Regions`, `Twist`, `Pose`, `Joints` and `Jacobian`"
+    note = "signals are `Scalar`, `Flag`, `Features`, `Image`, `VectorImage`, `Mask`, `Regions`, `Twist`, `Pose`, `Joints` and `Jacobian`"
 )]
 pub trait Signal: Default + Clone + Send + 'static {
     /// The kind.
@@ -133,7 +133,7 @@ macro_rules! settable {
     ($($kind:ident)*) => { $(impl Settable for $kind {})* };
 }
 
-settable! { Scalar Flag Image Mask Regions Twist Pose Joints Jacobian }
+settable! { Scalar Flag Image VectorImage Mask Regions Twist Pose Joints Jacobian }
 
 macro_rules! kinds {
     ($($kind:ident $shape:ident $arena:ident $name:literal $word:literal: $summary:literal, $doc:literal
@@ -250,7 +250,7 @@ macro_rules! kinds {
             /// Whether every value is finite. Images are not checked here: inlets check them once, when they arrive.
             #[must_use]
             pub fn are_finite(&self) -> bool {
-                $((Kind::$kind == Kind::Image || self.$arena.iter().fold(true, |all, value| all & value.is_finite())) &)* true
+                $((Kind::$kind.is_picture() || self.$arena.iter().fold(true, |all, value| all & value.is_finite())) &)* true
             }
 
             /// Whether a value of `kind` is finite.
@@ -318,6 +318,15 @@ kinds! {
         fn copy_to(&self, slot: &mut Self) { slot.copy_from(self); }
         fn is_finite(&self) -> bool { Self::is_finite(self) }
     }
+    VectorImage VectorImageShape vector_images "vector_image" "vector image":
+        "three numbers for each tactel of a pad with three axes, row by row",
+        "x and y are the force with which the object drags the tactel along the sensor's x and y. z is the force with which \
+        it presses the tactel, positive as in an image. All have the same unit. Shape and frame are those of an image." {
+        fn allocate(shape: &VectorImageShape) -> Self { Self::zeros(shape.0.rows, shape.0.cols) }
+        fn size(&self) -> [usize; 2] { [self.rows(), self.cols()] }
+        fn copy_to(&self, slot: &mut Self) { slot.copy_from(self); }
+        fn is_finite(&self) -> bool { Self::is_finite(self) }
+    }
     Mask MaskShape masks "mask" "mask": "true or false for each tactel of a pad",
         "The shape is the number of rows and columns. A mask belongs to the frame of its pad." {
         fn allocate(grid: &MaskShape) -> Self { Self::empty(grid.rows, grid.cols) }
@@ -367,7 +376,7 @@ impl Kind {
     #[must_use]
     pub const fn arguments(self) -> &'static [&'static str] {
         match self {
-            Self::Scalar | Self::Features | Self::Image | Self::Regions => &["unit", "frame"],
+            Self::Scalar | Self::Features | Self::Image | Self::VectorImage | Self::Regions => &["unit", "frame"],
             Self::Flag => &[],
             Self::Mask | Self::Twist => &["frame"],
             Self::Pose => &["frame", "reference"],
@@ -393,6 +402,12 @@ impl Kind {
         self.takes("unit")
     }
 
+    /// Whether it has numbers for each tactel, which are shown as a picture.
+    #[must_use]
+    pub const fn is_picture(self) -> bool {
+        matches!(self, Self::Image | Self::VectorImage)
+    }
+
     /// Formats a size for messages: `16 by 16 tactels`, `7 joints`.
     pub(crate) fn size_in_words(self, [first, second]: [usize; 2]) -> String {
         match self {
@@ -416,7 +431,7 @@ impl Shape {
     pub const fn unit(&self) -> Option<Unit> {
         match self {
             Self::Scalar(shape) => Some(shape.unit),
-            Self::Image(shape) => Some(shape.unit),
+            Self::Image(shape) | Self::VectorImage(VectorImageShape(shape)) => Some(shape.unit),
             Self::Regions(shape) => Some(shape.unit),
             Self::Joints(shape) => Some(shape.unit),
             _ => None,
@@ -427,7 +442,7 @@ impl Shape {
     pub const fn set_unit(&mut self, unit: Unit) {
         match self {
             Self::Scalar(shape) => shape.unit = unit,
-            Self::Image(shape) => shape.unit = unit,
+            Self::Image(shape) | Self::VectorImage(VectorImageShape(shape)) => shape.unit = unit,
             Self::Regions(shape) => shape.unit = unit,
             Self::Joints(shape) => shape.unit = unit,
             _ => {}

@@ -18,6 +18,7 @@ mod scalars;
 mod spatial;
 mod unit;
 mod unit_size;
+mod vector_image;
 
 pub(crate) use bytes::{ByteReader, put_text};
 pub use features::{Component, Feature, Features, FeaturesShape};
@@ -31,6 +32,7 @@ pub use regions::{Region, Regions, RegionsShape, Run};
 pub use spatial::{Pose, PoseShape, Twist, TwistShape};
 pub use unit::{Base, Unit};
 pub use unit_size::UnitSize;
+pub use vector_image::{VectorImage, VectorImageShape};
 
 /// Whether every value is finite. Checks the bits of the exponents, so that the loop vectorises.
 #[inline]

@@ -6,7 +6,7 @@ use super::{Arenas, Features, Flag, Joints, Kind, Pose, Scalar, Shape, Signal, T
 
 impl Shape {
     /// Returns the scalars of a value of this shape: the suffix of each name (empty for a scalar or a flag) and its
-    /// unit. Images, masks, regions and Jacobians have none.
+    /// unit. Images, vector images, masks, regions and Jacobians have none.
     #[must_use]
     pub fn scalars(&self) -> Vec<(String, Unit)> {
         let named =
@@ -25,7 +25,7 @@ impl Shape {
                 [named(&["x", "y", "z"], Unit::METRE), named(&["qx", "qy", "qz", "qw"], Unit::ONE)].concat()
             }
             Self::Joints(shape) => shape.joints.iter().map(|joint| (joint.name.clone(), shape.unit)).collect(),
-            Self::Image(_) | Self::Mask(_) | Self::Regions(_) | Self::Jacobian(_) => Vec::new(),
+            Self::Image(_) | Self::VectorImage(_) | Self::Mask(_) | Self::Regions(_) | Self::Jacobian(_) => Vec::new(),
         }
     }
 }
@@ -50,7 +50,7 @@ impl Arenas {
                 write(row, first, pose.translation.vector.iter().chain(quaternion.iter()).copied())
             }
             Kind::Joints => write(row, first, Joints::arena(self)[slot].0.iter().copied()),
-            Kind::Image | Kind::Mask | Kind::Regions | Kind::Jacobian => 0,
+            Kind::Image | Kind::VectorImage | Kind::Mask | Kind::Regions | Kind::Jacobian => 0,
         }
     }
 }

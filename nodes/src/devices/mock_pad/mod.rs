@@ -8,7 +8,7 @@ mod press;
 
 use tactflow_runtime::device::{Commands, Description, Device, DeviceError, Driver, Opened, Output, Samples, Stepped};
 use tactflow_runtime::node::{Describe, Mistake, Mistakes, Param, refuse_any};
-use tactflow_runtime::signal::{Image, ImageShape, Unit};
+use tactflow_runtime::signal::{Image, ImageShape, Unit, VectorImage};
 
 use super::{nanos, pad, period_of};
 use crate::arm::mount::Mount;
@@ -60,7 +60,8 @@ const MAX_TACTELS: usize = 1 << 22;
 /// A simulated pad with scripted presses of points and bars, and with scripted faults.
 ///
 /// Each `press` is a smooth bump of force, (1 - d²/r²)² at distance d from a point or a bar. It appears, moves and
-/// disappears on a schedule. Its tactels sum to its `force` while it is on the pad, and it slides off smoothly. Foam,
+/// disappears on a schedule. Its tactels sum to its `force` while it is on the pad, and it slides off smoothly. If a press
+/// has a `drag`, the pad has three axes, and the drag is spread as the force. Foam,
 /// noise and hysteresis are not simulated: use the pad to try out a graph and for tests whose result is known, not to
 /// tune gains.
 ///
@@ -69,11 +70,11 @@ const MAX_TACTELS: usize = 1 << 22;
 /// `unplug` the device fails, and it stays failed also after `for_s`. Try a graph with each of them.
 ///
 /// It states the facts `dead` (no tactel is), `threshold`, `pressure`, `calibration` (its values are forces already)
-/// and `mount`.
+/// and `mount`; with three axes also `vector_gain`, which is 1.
 ///
 /// ```toml
 /// [roles]
-/// pad = "tactile_pad"
+/// pad = "three_axis_pad"              # or "tactile_pad", for a press without a drag
 ///
 /// [bind]
 /// pad = "pad"
@@ -82,12 +83,18 @@ const MAX_TACTELS: usize = 1 << 22;
 /// type = "mock_pad"                   # 16 by 16 tactels, 5 mm apart, in N, 250 frames a second
 /// for_s = 4.0                         # [s]
 /// press = [
-///     { from_s = 0.5, to_s = 3.5, at = [-0.010, 0.005], speed = [0.004, 0.0], force = 4.0 },   # [s, s, m, m/s, N]
+///     { from_s = 0.5, to_s = 3.5, at = [-0.010, 0.005], speed = [0.004, 0.0], force = 4.0, drag = [0.6, 0.0] },   # [s, s, m, m/s, N, N]
 /// ]
 /// ```
 #[derive(Debug, Describe)]
 pub struct MockPad {
     image: Output<Image>,
+    /// The vector image of a pad with three axes.
+    vectors: Option<Output<VectorImage>>,
+    /// The newest image.
+    cells: Vec<f32>,
+    /// The newest vector image; empty for a pad with one axis.
+    vector_cells: Vec<[f32; 3]>,
     shape: ImageShape,
     presses: Vec<Press>,
     glitches: Vec<Glitch>,
@@ -126,8 +133,15 @@ impl Device for MockPad {
         let calibration = toml::Table::from_iter([("gain".to_owned(), 1.0.into())]);
         let mut facts = pad::facts(params.threshold, params.pressure, params.unit, calibration);
         facts.push(pad::mount(&params.mount));
-        let image = pad::fill(description.fills(pad::ROLE), shape.clone(), facts);
-        let pad = Self::new(image, shape, period, params);
+        let (image, vectors) = if params.press.iter().any(Press::has_drag) {
+            facts.push(("vector_gain".into(), vec![1.0; 3].into()));
+            let (image, vectors) = pad::fill_three_axes(description.fills(pad::THREE_AXES), shape.clone(), facts);
+            (image, Some(vectors))
+        } else {
+            (pad::fill(description.fills(pad::ROLE), shape.clone(), facts), None)
+        };
+        let vector_cells = vec![[0.0; 3]; if vectors.is_some() { shape.tactels() } else { 0 }];
+        let pad = Self { vectors, vector_cells, ..Self::new(image, shape, period, params) };
         Ok(Opened { description, driver: Driver::Stepped(Box::new(pad)) })
     }
 }
@@ -142,6 +156,9 @@ impl MockPad {
         let frames = frame_from(params.for_s.map_or(i64::MAX, nanos), period);
         let mut pad = Self {
             image,
+            vectors: None,
+            cells: vec![0.0; shape.tactels()],
+            vector_cells: Vec::new(),
             shape,
             presses: params.press,
             glitches: params.glitch,
@@ -208,14 +225,18 @@ impl MockPad {
         }
     }
 
-    fn render(&self, due: Due, cells: &mut [f32]) {
+    fn render(&mut self, due: Due) {
+        let Self { cells, vector_cells, .. } = self;
         cells.fill(0.0);
+        vector_cells.fill([0.0; 3]);
         let seconds = (due.frame * self.period) as f64 * 1e-9;
         for press in &self.presses {
-            press.add(&self.shape, seconds, cells);
+            press.add(&self.shape, seconds, cells, vector_cells);
         }
+        let middle = cells.len() / 2;
         if due.is_nan {
-            cells[cells.len() / 2] = f32::NAN;
+            cells[middle] = f32::NAN;
+            vector_cells.get_mut(middle).into_iter().for_each(|cell| cell[2] = f32::NAN);
         }
     }
 }
@@ -234,7 +255,11 @@ impl Stepped for MockPad {
             return Err(DeviceError("a `glitch` with `unplug` disconnected it".into()));
         }
         if let Some(due) = self.due(now) {
-            self.render(due, samples.write(self.image, due.stamp, due.sequence).cells_mut());
+            self.render(due);
+            samples.write(self.image, due.stamp, due.sequence).cells_mut().copy_from_slice(&self.cells);
+            if let Some(vectors) = self.vectors {
+                samples.write(vectors, due.stamp, due.sequence).cells_mut().copy_from_slice(&self.vector_cells);
+            }
         }
         Ok(())
     }

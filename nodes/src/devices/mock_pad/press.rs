@@ -30,6 +30,9 @@ pub struct Press {
     /// Total force.
     #[param(unit = "$unit", above = 0.0, default = 10.0)]
     force: f64,
+    /// Total force along the pad's x and y; with it the pad has three axes.
+    #[param(unit = "$unit")]
+    drag: Option<[f64; 2]>,
 }
 
 /// Maximum width of a bump [tactels].
@@ -51,8 +54,30 @@ impl Press {
         None
     }
 
-    /// Adds the force of the press at `time` [s] to the cells of a pad.
-    pub fn add(&self, shape: &ImageShape, time: f64, cells: &mut [f32]) {
+    /// Whether it drags the pad.
+    #[must_use]
+    pub const fn has_drag(&self) -> bool {
+        self.drag.is_some()
+    }
+
+    /// Adds the force of the press at `time` [s] to the cells of a pad, and what it does along three axes to `vectors`,
+    /// which are empty for a pad with one axis.
+    pub fn add(&self, shape: &ImageShape, time: f64, cells: &mut [f32], vectors: &mut [[f32; 3]]) {
+        let [x, y] = self.drag.unwrap_or_default();
+        self.each(shape, time, |at, bump, whole| {
+            let force = (self.force / whole * bump) as f32;
+            cells[at] += force;
+            if let Some([along, across, normal]) = vectors.get_mut(at) {
+                *along += (x / whole * bump) as f32;
+                *across += (y / whole * bump) as f32;
+                *normal += force;
+            }
+        });
+    }
+
+    /// Calls `add` for each tactel under the press, with its index, the height of the bump, and the sum of all heights on
+    /// an infinite array.
+    fn each(&self, shape: &ImageShape, time: f64, mut add: impl FnMut(usize, f64, f64)) {
         if time < self.from_s || self.to_s.is_some_and(|to| time >= to) {
             return;
         }
@@ -78,10 +103,9 @@ impl Press {
                 whole += bump(i, j);
             }
         }
-        let scale = self.force / whole;
         for i in span(1).filter(|i| (0..shape.rows as i64).contains(i)) {
             for j in span(0).filter(|j| (0..shape.cols as i64).contains(j)) {
-                cells[i as usize * shape.cols + j as usize] += (scale * bump(i, j)) as f32;
+                add(i as usize * shape.cols + j as usize, bump(i, j), whole);
             }
         }
     }

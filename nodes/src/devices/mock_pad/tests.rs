@@ -193,3 +193,19 @@ fn bad_settings() {
     let several = open::<MockPad>("rows = 100000\ncols = 100000\npress = [{ radius = 9 }]").err().unwrap();
     assert_eq!(several.len(), 2);
 }
+
+#[test]
+fn a_press_with_a_drag_makes_a_pad_with_three_axes() {
+    let params = "press = [{ force = 4.0, drag = [0.6, -0.2] }, { at = [0.01, 0.0], force = 2.0 }]";
+    let mut bench = Bench::new(open::<MockPad>(params).unwrap());
+    assert_eq!(bench.description.roles().collect::<Vec<_>>(), ["three_axis_pad"]);
+    bench.exchange(0);
+    let output = bench.description.output::<VectorImage>("vectors").unwrap();
+    let vectors = bench.samples.get(output).unwrap().cells().to_vec();
+    let sums = vectors.iter().fold([0.0_f64; 3], |sums, cell| [0, 1, 2].map(|axis| sums[axis] + f64::from(cell[axis])));
+    assert!(sums.iter().zip([0.6, -0.2, 6.0]).all(|(sum, wanted)| (sum - wanted).abs() < 1e-5), "{sums:?}");
+    let normal: Vec<f32> = vectors.iter().map(|[.., z]| *z).collect();
+    assert_eq!(bench.image().cells(), normal, "z is the image, to the last bit");
+    let bench = Bench::new(open::<MockPad>("press = [{ force = 4.0 }]").unwrap());
+    assert_eq!(bench.description.roles().collect::<Vec<_>>(), ["tactile_pad"]);
+}

@@ -177,8 +177,16 @@ fn difference(what: &str, file: &[(String, String)], now: &[(String, String)]) -
 impl PortText {
     /// Returns the kind of an input.
     pub(crate) fn input(&self) -> Result<Kind, String> {
-        const KINDS: [Kind; 7] =
-            [Kind::Scalar, Kind::Flag, Kind::Features, Kind::Image, Kind::Mask, Kind::Twist, Kind::Joints];
+        const KINDS: [Kind; 8] = [
+            Kind::Scalar,
+            Kind::Flag,
+            Kind::Features,
+            Kind::Image,
+            Kind::VectorImage,
+            Kind::Mask,
+            Kind::Twist,
+            Kind::Joints,
+        ];
         let kind = KINDS.into_iter().find(|kind| kind.name() == self.kind);
         let kind = kind.ok_or_else(|| {
             let known: Vec<String> = KINDS.iter().map(|kind| format!("`{}`", kind.name())).collect();

@@ -4,7 +4,7 @@ use std::time::{Duration, Instant};
 
 use async_trait::async_trait;
 use tactflow_runtime::device::{DeviceError, Link, Live, Output};
-use tactflow_runtime::signal::Image;
+use tactflow_runtime::signal::{Image, VectorImage};
 use tokio::time::{sleep_until, timeout};
 
 use super::plan::Plan;
@@ -25,6 +25,8 @@ const MIN_PAUSE: Duration = Duration::from_millis(1);
 /// A pad that is described and ready to run.
 pub(super) struct PadDriver {
     image: Output<Image>,
+    /// The vector image of a pad with three axes.
+    vectors: Option<Output<VectorImage>>,
     reader: Reader,
     /// The newest image.
     cells: Vec<f32>,
@@ -72,10 +74,10 @@ impl Live for PadDriver {
 }
 
 impl PadDriver {
-    pub(super) fn new(image: Output<Image>, plan: Plan) -> Self {
+    pub(super) fn new(image: Output<Image>, vectors: Option<Output<VectorImage>>, plan: Plan) -> Self {
         let reader = Reader::new(plan);
         let (cells, received) = (reader.cells(), Vec::with_capacity(RECEIVED_BYTES));
-        Self { image, reader, cells, received, is_lost: false, strange: 0, rejected: 0 }
+        Self { image, vectors, reader, cells, received, is_lost: false, strange: 0, rejected: 0 }
     }
 
     const fn plan(&self) -> &Plan {
@@ -155,6 +157,9 @@ impl PadDriver {
             };
             link.publish(|samples| {
                 samples.write(self.image, stamp, read.number).cells_mut().copy_from_slice(&self.cells);
+                if let Some(vectors) = self.vectors {
+                    samples.write(vectors, stamp, read.number).cells_mut().copy_from_slice(&self.reader.vectors);
+                }
             });
         }
         if has_image {
@@ -184,6 +189,9 @@ impl PadDriver {
     fn lose(&mut self, link: &mut Link, why: &str) {
         self.is_lost = true;
         link.lost(self.image, format!("{}: {why}", self.plan().address));
+        if let Some(vectors) = self.vectors {
+            link.lost(vectors, format!("{}: {why}", self.plan().address));
+        }
     }
 
     /// Says why there is no frame.

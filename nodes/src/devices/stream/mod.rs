@@ -10,9 +10,9 @@ mod listen;
 mod plan;
 mod reader;
 
-use tactflow_runtime::device::{Description, Device, Driver, Opened, Output};
+use tactflow_runtime::device::{Description, Device, Driver, Opened};
 use tactflow_runtime::node::{Describe, Mistakes};
-use tactflow_runtime::signal::{Image, ImageShape};
+use tactflow_runtime::signal::ImageShape;
 
 use super::{Facts, pad};
 #[cfg(feature = "cli")]
@@ -43,6 +43,10 @@ pub(crate) use plan::text::bytes_of;
 /// **Text.** With `cell = "dec"` or `"hex"`, a frame is numbers with commas, semicolons or white space between them.
 /// `offset`, `stride` and `length` count values.
 ///
+/// **Three axes.** With `tangential`, a pad whose tactels have several values fills the role `three_axis_pad`: it has a
+/// vector image beside the image. The bench states how forces come from it: `facts.pad.vector_gain = [0.001, 0.001, 0.002]`
+/// in N per reading, and `facts.pad.friction`.
+///
 /// **Silence.** A pad that sends no frame for `timeout_ms` is lost. The device sends `start` again, and opens the link
 /// again, until a frame comes or the run ends. A board may need 3 s for its first frame.
 ///
@@ -64,9 +68,7 @@ pub(crate) use plan::text::bytes_of;
 /// link = "serial:/dev/serial/by-id/usb-1a86_USB_Serial-if00-port0"
 /// ```
 #[derive(Debug, Describe)]
-pub struct Stream {
-    image: Output<Image>,
-}
+pub struct Stream;
 
 impl Device for Stream {
     type Params = Params;
@@ -77,8 +79,14 @@ impl Device for Stream {
         let shape = ImageShape { rows, cols, pitch: [params.pitch; 2], unit: params.unit };
         let mut description = Description::every(1.0 / params.rate_hz);
         description.latency = params.latency_ms * 1e-3;
-        let stream = Self { image: pad::fill(description.fills(pad::ROLE), shape, facts(&params)?) };
-        let driver = PadDriver::new(stream.image, plan);
+        let facts = facts(&params)?;
+        let (image, vectors) = if plan.vectors.is_some() {
+            let (image, vectors) = pad::fill_three_axes(description.fills(pad::THREE_AXES), shape, facts);
+            (image, Some(vectors))
+        } else {
+            (pad::fill(description.fills(pad::ROLE), shape, facts), None)
+        };
+        let driver = PadDriver::new(image, vectors, plan);
         Ok(Opened { description, driver: Driver::Live(Box::new(driver)) })
     }
 }

@@ -11,6 +11,8 @@ pub(super) struct Reader {
     pub(super) plan: Plan,
     /// The values of the frame, those of all parts.
     values: Vec<f64>,
+    /// The vector image of the last frame; empty for a pad with one axis.
+    pub(super) vectors: Vec<[f32; 3]>,
     /// The values of one part, for a look at frames that may be none.
     part: Vec<f64>,
     /// The bytes of the last frame, and whether there is one: a frame without a counter is compared with them.
@@ -49,7 +51,8 @@ impl Reader {
     pub(super) fn new(plan: Plan) -> Self {
         let (values, part) = (vec![0.0; plan.values], vec![0.0; plan.decoder.layout.count]);
         let (last, current, counts) = (Vec::new(), Vec::new(), Counts::default());
-        Self { plan, values, part, last, has_last: false, current, number: 0, counts, tally: Tally::default() }
+        let vectors = vec![[0.0; 3]; if plan.vectors.is_some() { plan.image.places.len() } else { 0 }];
+        Self { plan, values, vectors, part, last, has_last: false, current, number: 0, counts, tally: Tally::default() }
     }
 
     /// Returns a buffer for an image.
@@ -144,7 +147,7 @@ impl Reader {
         let is_same = std::mem::replace(&mut self.has_last, true) && self.last == self.current;
         std::mem::swap(&mut self.last, &mut self.current);
         self.current.clear();
-        if !self.plan.image.write(&self.values, cells) {
+        if !(self.plan.image.write(&self.values, cells) && self.write_vectors()) {
             self.tally.rejected += 1;
             return None;
         }
@@ -167,6 +170,15 @@ impl Reader {
         }
         self.tally.frames += 1;
         Some(Read { number: self.number, time })
+    }
+
+    /// Writes the vector image, if the pad has one. Returns whether all values are finite.
+    fn write_vectors(&mut self) -> bool {
+        let axes = self.plan.vectors.iter().flatten().enumerate();
+        axes.fold(true, |is_finite, (axis, image)| {
+            let cells = self.vectors.iter_mut().map(|cell| &mut cell[axis]);
+            image.write(&self.values, cells) & is_finite
+        })
     }
 
     /// Adds what framing has counted. Returns whether bytes or frames were dropped.

@@ -70,6 +70,22 @@ const MISTAKES: &[(&str, &str, &str)] = &[
     ("shape = [2, 3, 2]\naxes = ['x', 'x']", "axes", "two axes are called `x`"),
     ("shape = [2, 3, 2]\naxes = ['x', 'z']", "axes", "`axis` is missing"),
     ("shape = [2, 3, 2]\naxes = ['x', 'z']\naxis = 'y'", "axis", "no axis is called `y`"),
+    ("tangential = ['x', 'y']", "tangential", "a vector image needs three axes"),
+    (
+        "shape = [2, 3, 3]\naxes = ['x', 'y', 'z']\naxis = 'z'\ntangential = ['x']",
+        "tangential",
+        "`tangential` has 1 names",
+    ),
+    (
+        "shape = [2, 3, 3]\naxes = ['x', 'y', 'z']\naxis = 'z'\ntangential = ['x', '-w']",
+        "tangential",
+        "no axis is called `w`",
+    ),
+    (
+        "shape = [2, 3, 3]\naxes = ['x', 'y', 'z']\naxis = 'z'\ntangential = ['x', '-z']",
+        "tangential",
+        "must be three axes",
+    ),
     ("plausible = { value = [3, 1] }", "plausible.value", "the least value 3 is above the greatest value 1"),
     ("plausible = { valeu = [1, 3] }", "plausible.valeu", "no axis is called `valeu`"),
     ("lut = [0, 1, 2, 3, 4, 4]", "lut", "`lut` has the index 4 twice, and the index 5 is missing"),
@@ -172,6 +188,33 @@ impl Pad {
     fn last(&mut self, bytes: &[u8]) -> Vec<f32> {
         self.read(bytes).pop().expect("an image").1
     }
+}
+
+#[test]
+fn three_axes_become_a_vector_image() {
+    // Temperature, x, y and z of two tactels; the image is flipped, and the data sheet counts y downward.
+    let keys = "cell = 'i16le'\nshape = [1, 2, 4]\naxes = ['t', 'x', 'y', 'z']\naxis = 'z'\n\
+                tangential = ['x', '-y']\norder = ['flip_x']\nscale = { invert_full = 100, gain = 0.5 }\nunit = 'N'";
+    let Ok(Opened { description, .. }) = open::<Stream>(&with(keys)) else { panic!("it opens") };
+    assert_eq!(description.roles().collect::<Vec<_>>(), ["three_axis_pad"]);
+    let Some(Shape::VectorImage(shape)) = description.shape("vectors") else { panic!("a vector image") };
+    assert_eq!((shape.0.rows, shape.0.cols, shape.0.unit.to_string()), (1, 2, "N".to_owned()));
+    let mut pad = Pad::new(&with(keys));
+    let frame = |values: [i16; 8]| {
+        let bytes = values.iter().flat_map(|value| value.to_le_bytes());
+        [0xAA, 0x55].into_iter().chain(bytes).collect::<Vec<u8>>()
+    };
+    let frames = [
+        frame([20, 1, 2, 98, 20, -3, 4, 60]),
+        frame([21, 1, 2, 98, 20, -3, 4, 60]),
+        frame([20, 7, 8, 90, 20, 5, 6, 80]),
+    ];
+    let image = pad.last(&frames.concat());
+    // z falls with the force; x and y are about their zero.
+    assert_eq!(image, [10.0, 5.0]);
+    assert_eq!(pad.reader.vectors, [[2.5, -3.0, 10.0], [3.5, -4.0, 5.0]]);
+    let without = Pad::new(&with(&keys.replace("tangential = ['x', '-y']\n", "")));
+    assert!(without.reader.vectors.is_empty());
 }
 
 #[test]

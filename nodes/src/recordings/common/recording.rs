@@ -16,6 +16,8 @@ pub struct Recording {
     pub frames: Vec<Frame>,
     /// The windows of all frames, one after the other, row after row.
     pub cells: Vec<f32>,
+    /// x and y of each of those cells, whose z it is then; empty for a pad with one axis.
+    pub drag: Vec<[f32; 2]>,
     /// Index in the whole array of each cell that does not exist, in order.
     pub dead: Vec<usize>,
     /// Maximum value that the sensor's own filter treats as noise, in the unit of the cells.
@@ -82,6 +84,22 @@ impl Recording {
         }
     }
 
+    /// Writes frame `index` of a pad with three axes to the cells of a vector image of the whole array, with zeros outside
+    /// its window.
+    ///
+    /// # Panics
+    /// If there is no such frame, the pad has one axis, or the image is smaller than the array.
+    pub fn show_vectors(&self, index: usize, image: &mut [[f32; 3]]) {
+        let Frame { window, start, .. } = self.frames[index];
+        image.fill([0.0; 3]);
+        for cell in 0..window.cells() {
+            let (row, col) = (cell / window.cols as usize, cell % window.cols as usize);
+            let [x, y] = self.drag[start + cell];
+            let at = (window.top as usize + row) * self.shape.cols + window.left as usize + col;
+            image[at] = [x, y, self.cells[start + cell]];
+        }
+    }
+
     /// Whether frames, cells, dead cells and times are consistent. Every reader guarantees this.
     #[must_use]
     pub fn is_sound(&self) -> bool {
@@ -99,6 +117,8 @@ impl Recording {
             && !self.frames.is_empty()
             && self.frames.is_sorted_by_key(|frame| frame.time)
             && self.cells.iter().all(|cell| cell.is_finite())
+            && (self.drag.is_empty() || self.drag.len() == next)
+            && self.drag.as_flattened().iter().all(|value| value.is_finite())
             && self.dead.is_sorted_by(|a, b| a < b)
             && self.dead.last().is_none_or(|last| *last < self.shape.tactels())
             && self.period > 0.0

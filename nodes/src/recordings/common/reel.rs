@@ -14,6 +14,8 @@ pub(crate) struct Reel {
     pub(crate) frames: Vec<Frame>,
     /// The cells, including those of the incomplete frame.
     pub(crate) cells: Vec<f32>,
+    /// x and y of each cell of a pad with three axes.
+    pub(crate) drag: Vec<[f32; 2]>,
     /// Index in a frame of the cells that do not exist.
     pub(crate) dead: Vec<usize>,
     /// Number of frames with a time.
@@ -58,7 +60,7 @@ impl Default for Reel {
 impl Reel {
     /// Returns an empty reel with its messages about a cell that stops or begins to exist.
     pub(crate) const fn new(changes: [&'static str; 2]) -> Self {
-        Self { frames: Vec::new(), cells: Vec::new(), dead: Vec::new(), timed: 0, changes }
+        Self { frames: Vec::new(), cells: Vec::new(), drag: Vec::new(), dead: Vec::new(), timed: 0, changes }
     }
 
     /// Adds the next cell. A cell that is NaN in the first frame does not exist, and must be NaN in every frame.
@@ -158,9 +160,9 @@ impl Reel {
         for (i, frame) in self.frames.iter_mut().enumerate() {
             frame.time = if has_times { frame.time - start } else { (i as f64 * period * 1e9).round() as i64 };
         }
-        let (Self { frames, cells, dead, .. }, Properties { threshold, force, .. }) = (self, found);
+        let (Self { frames, cells, drag, dead, .. }, Properties { threshold, force, .. }) = (self, found);
         let shape = ImageShape { rows, cols, pitch, unit };
-        Ok(Recording { format, shape, frames, cells, dead, threshold, period, force })
+        Ok(Recording { format, shape, frames, cells, drag, dead, threshold, period, force })
     }
 }
 

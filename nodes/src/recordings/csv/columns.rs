@@ -19,8 +19,10 @@ pub(super) struct CsvColumns {
 /// The role of a column.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Role {
-    /// The tactel with this index in a frame.
+    /// The tactel with this index in a frame; with three axes, its z.
     Tactel(usize),
+    /// The x (0) or the y (1) of the tactel with this index.
+    Drag(usize, usize),
     /// The time.
     Time,
     /// A force that another sensor measured.
@@ -31,6 +33,9 @@ pub(super) enum Role {
 
 /// The row and the column in the name of a tactel.
 type Place = (u32, u32);
+
+/// The axes of a tactel, as names end with them.
+const AXES: [char; 3] = ['x', 'y', 'z'];
 
 impl CsvColumns {
     /// Returns columns that are tactels row by row.
@@ -46,7 +51,7 @@ impl CsvColumns {
         names.check(count <= MAX_CELLS, format_args!("{count} columns are more than the maximum of {MAX_CELLS}"))?;
         let roles = Vec::with_capacity(count);
         let mut columns = Self { size: [0, 0], second: 1.0, unlabelled: None, roles };
-        let (mut places, mut found) = (Vec::new(), 0);
+        let (mut places, mut axes, mut found) = (Vec::new(), Vec::new(), 0);
         for name in notation.fields(names).map(unquoted) {
             let title = || shortened(name.text);
             if let Some(role) = columns.beside(name)? {
@@ -55,7 +60,12 @@ impl CsvColumns {
                 columns.roles.push(role);
                 continue;
             }
-            let place = place(name.text);
+            let (plain, axis) = axis(name.text);
+            let place = place(plain);
+            if found > 0 && axes.is_empty() == axis.is_some() {
+                return Err(name.error("only some names end with an axis (x, y or z)").into());
+            }
+            axes.extend(axis);
             if found > 0 && places.is_empty() == place.is_some() {
                 return Err(match place {
                     None => name.error(format!("`{}` has no row and column, but other names do", title())),
@@ -73,7 +83,7 @@ impl CsvColumns {
             names.check(rows.checked_mul(cols) == Some(found), message)?;
             size
         } else {
-            let size = columns.settle(&places).map_err(|message| names.error(message))?;
+            let size = columns.settle(&places, &axes).map_err(|message| names.error(message))?;
             hints.size(Some(size))?
         };
         columns.take_time_unit(hints)?;
@@ -94,9 +104,14 @@ impl CsvColumns {
         Ok(())
     }
 
+    /// Returns whether the tactels have three axes.
+    pub(super) fn has_axes(&self) -> bool {
+        self.roles.iter().any(|role| matches!(role, Role::Drag(..)))
+    }
+
     /// Gives each tactel the index of its place, and returns the size of the array. Places count from 0 or from 1, and
-    /// each must appear once.
-    fn settle(&mut self, places: &[Place]) -> Result<[usize; 2], String> {
+    /// each must appear once, or once with each axis.
+    fn settle(&mut self, places: &[Place], axes: &[usize]) -> Result<[usize; 2], String> {
         let (mut first, mut last) = (places[0], places[0]);
         for (row, col) in places {
             first = (first.0.min(*row), first.1.min(*col));
@@ -106,18 +121,24 @@ impl CsvColumns {
             return Err("the names of the tactels must count rows and columns from 0 or from 1".into());
         }
         let [rows, cols] = [(last.0 - first.0) as usize + 1, (last.1 - first.1) as usize + 1];
-        let found = places.len();
-        if rows.checked_mul(cols) != Some(found) {
-            return Err(format!("the names reach {rows} rows by {cols} columns, but there are {found} names"));
+        let (found, values) = (places.len(), if axes.is_empty() { 1 } else { AXES.len() });
+        if rows.checked_mul(cols).and_then(|tactels| tactels.checked_mul(values)) != Some(found) {
+            let each = if values > 1 { " with three axes each" } else { "" };
+            return Err(format!("the names reach {rows} rows by {cols} columns{each}, but there are {found} names"));
         }
         let mut is_there = vec![false; found];
         let tactels = self.roles.iter_mut().filter(|role| matches!(role, Role::Tactel(_)));
-        for (role, (row, col)) in tactels.zip(places) {
+        for (i, (role, (row, col))) in tactels.zip(places).enumerate() {
             let index = (row - first.0) as usize * cols + (col - first.1) as usize;
-            if std::mem::replace(&mut is_there[index], true) {
-                return Err(format!("row {row} and column {col} appear twice"));
+            let axis = axes.get(i).copied();
+            if std::mem::replace(&mut is_there[index * values + axis.unwrap_or(0)], true) {
+                let axis = axis.map_or_else(String::new, |axis| format!(" with the axis {}", AXES[axis]));
+                return Err(format!("row {row} and column {col}{axis} appear twice"));
             }
-            *role = Role::Tactel(index);
+            *role = match axis {
+                Some(axis @ (0 | 1)) => Role::Drag(index, axis),
+                _ => Role::Tactel(index),
+            };
         }
         Ok([rows, cols])
     }
@@ -159,6 +180,16 @@ pub(super) fn names_of(names: Piece<'_>) -> Notation {
 
 pub(super) fn unquoted(name: Piece<'_>) -> Piece<'_> {
     name.part(name.text.trim_matches(['"', '\''])).trimmed()
+}
+
+/// Splits the name of an axis of a tactel, such as `t0_3_x` or `r0c3z`, into the name of the tactel and the axis.
+fn axis(name: &str) -> (&str, Option<usize>) {
+    let axis = name.chars().next_back().and_then(|last| AXES.iter().position(|axis| last.eq_ignore_ascii_case(axis)));
+    let plain = name[..name.len() - usize::from(axis.is_some())].trim_end_matches(['_', '.', ' ', '-']);
+    match axis {
+        Some(axis) if place(plain).is_some() => (plain, Some(axis)),
+        _ => (name, None),
+    }
 }
 
 /// Returns the row and the column in a name such as `t0_3`, `r0c3` or `x3y0`: one with exactly two numbers.

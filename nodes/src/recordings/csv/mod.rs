@@ -2,7 +2,8 @@
 //!
 //! There are two layouts. **A frame a row**: the tactels row by row, separated by `,`, `;`, tabs or blanks, under an
 //! optional first row of names. Names with two numbers, as `t0_3` or `r0c3`, give each tactel's row and column;
-//! otherwise the bench gives `size`. There may also be the columns `time` (seconds, or as in `time_ms`), `force` (a
+//! otherwise the bench gives `size`. Of a pad with three axes the names end with the axis, as `t0_3_x`, `t0_3_y` and
+//! `t0_3_z`: x and y drag the tactel, and z presses it. There may also be the columns `time` (seconds, or as in `time_ms`), `force` (a
 //! force that another sensor measured [N]) and `frame`. **A frame a block**: a line for each row of tactels, and a
 //! blank line between two frames; with the bench's `size` the blank lines may be missing.
 //!
@@ -185,6 +186,7 @@ impl CsvReader {
     fn rows(&mut self, lines: Lines<'_>, names: Option<Piece<'_>>, columns: &CsvColumns) -> Result<(), TextError> {
         let is_names = |line: &Piece<'_>| names.is_some_and(|names| names.start == line.start);
         let mut frame = vec![0.0; self.size[0] * self.size[1]];
+        let mut drag = vec![[0.0_f64; 2]; if columns.has_axes() { frame.len() } else { 0 }];
         for line in lines.filter(|line| is_content(line) && !is_names(line)) {
             let notation = Notation::of(line.text);
             let (mut found, mut time) = (0, None);
@@ -192,6 +194,10 @@ impl CsvReader {
                 let value = number(notation, cell, "this cell")?;
                 match columns.roles.get(found) {
                     Some(Role::Tactel(index)) => frame[*index] = value,
+                    Some(Role::Drag(index, axis)) => {
+                        cell.check((value as f32).is_finite(), "an x or a y must be a number")?;
+                        drag[*index][*axis] = value;
+                    }
                     Some(Role::Time) => time = Some(self.since_start(value * columns.second, cell)?),
                     Some(Role::Force) => {
                         cell.check(value.is_finite(), "a force must be a number")?;
@@ -209,6 +215,7 @@ impl CsvReader {
                 let place = || notation.fields(line).enumerate().find(is_here).map_or(line, |(_, at)| at);
                 self.reel.cell(*value).map_err(|message| place().error(message))?;
             }
+            self.reel.drag.extend(drag.iter().map(|drag| drag.map(|value| value as f32)));
             self.frame(time);
         }
         Ok(())

@@ -204,3 +204,32 @@ fn a_damaged_file_is_refused_or_gives_a_sound_recording() {
     let refused = count_refused(&[b"1,2,3\n4,5,6\n\n7,8,9\n10,11,12\n"], "", &sized(2, 3), 2000);
     assert!((1000..2000).contains(&refused), "{refused}");
 }
+
+#[test]
+fn names_with_axes_are_of_a_pad_with_three() {
+    let names = "time,t0_0_x,t0_0_y,t0_0_z,t0_1_x,t0_1_y,t0_1_z,t0_2_x,t0_2_y,t0_2_z";
+    let text = format!("{names}\n0.0,1,2,3,4,5,6,7,8,9\n0.1,-1,-2,30,-4,-5,60,-7,-8,90\n");
+    let recording = read(text.as_bytes(), "press.csv", &hints()).unwrap();
+    assert!(recording.is_sound() && (recording.shape.rows, recording.shape.cols) == (1, 3));
+    let mut vectors = [[0.0; 3]; 3];
+    recording.show_vectors(1, &mut vectors);
+    assert_eq!(vectors, [[-1.0, -2.0, 30.0], [-4.0, -5.0, 60.0], [-7.0, -8.0, 90.0]]);
+    assert_eq!(recording.cells, [3.0, 6.0, 9.0, 30.0, 60.0, 90.0], "the image is z");
+    // Any order, and other names.
+    let other = "time,r1c3z,r1c1x,r1c1y,r1c1z,r1c2z,r1c2x,r1c2y,r1c3x,r1c3y";
+    let other = format!("{other}\n0.0,9,1,2,3,6,4,5,7,8\n0.1,90,-1,-2,30,60,-4,-5,-7,-8\n");
+    assert_eq!(read(other.as_bytes(), "press.csv", &hints()).unwrap(), recording);
+    let cases = [
+        (text.replace("t0_2_z", "t0_2"), "only some names end with an axis (x, y or z)"),
+        (text.replace("t0_2_y", "t0_2_x"), "row 0 and column 2 with the axis x appear twice"),
+        (
+            text.replace("t0_2_", "t1_2_"),
+            "the names reach 2 rows by 3 columns with three axes each, but there are 9 names",
+        ),
+        (text.replace("0.1,-1", "0.1,nan"), "an x or a y must be a number"),
+    ];
+    for (text, message) in cases {
+        let found = complaints(read(text.as_bytes(), "press.csv", &hints()));
+        assert!(found.iter().any(|(_, found)| found.contains(message)), "{message}: {found:?}");
+    }
+}

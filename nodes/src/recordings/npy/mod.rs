@@ -1,10 +1,11 @@
 //! `npy` and `npz`: arrays of numpy.
 //!
 //! An `.npy` is an array `[frames, rows, columns]` of integers or floats. One of `[frames, tactels]` needs the bench's
-//! `size`. Rows run along the pad's x, with row i at the i-th y. A tactel that is NaN in the first frame does not
+//! `size`. One of `[frames, rows, columns, 3]` is of a pad with three axes: x, y and z of each tactel, where x and y drag
+//! it and z presses it. Rows run along the pad's x, with row i at the i-th y. A tactel that is NaN in the first frame does not
 //! exist, and must be NaN in every frame. The bench gives unit, pitch and rate.
 //!
-//! An `.npz` may give them itself. The images are the array `images`, or the only array with three axes. It may also
+//! An `.npz` may give them itself. The images are the array `images`, or the only array with such a shape. It may also
 //! hold `time` [s] and `force` [N] (one number a frame), `rate_hz` [1/s], `pitch_mm` [mm] or `pitch` [m] (one number,
 //! or one along x and one along y) and `unit` (a text, as `np.array("N")`). Other arrays are ignored.
 
@@ -21,7 +22,7 @@ use crate::recordings::common::{FileFormat, Frame, HEAD_BYTES, Hints, Parser, Re
 
 pub(super) const NPY: FileFormat = FileFormat {
     name: "npy",
-    title: "a numpy array [frames, rows, columns] (`.npy`)",
+    title: "a numpy array [frames, rows, columns], or [frames, rows, columns, 3] (`.npy`)",
     recognises: |head| head.bytes.starts_with(array::MAGIC),
     parser: Parser::Bytes(|bytes, hints| recording(NPY.name, bytes, Beside::default(), hints)),
 };
@@ -63,13 +64,13 @@ fn read_npz(bytes: &[u8], hints: &Hints) -> Result<Recording, Refusal> {
                 let taken = Array::read(&bytes).and_then(|array| beside.take(key, &array));
                 taken.map_err(|message| Refusal::broken(format!("`{key}`: {message}")))?;
             }
-            Some(_) if cubes.len() < 2 && has_three_axes(&archive, &file)? => cubes.push(file),
+            Some(_) if cubes.len() < 2 && has_images(&archive, &file)? => cubes.push(file),
             _ => {}
         }
     }
     let count = if cubes.is_empty() { "none" } else { "more than one" };
     let images = images.or_else(|| cubes.pop().filter(|_| cubes.is_empty())).ok_or_else(|| Refusal::Broken {
-        message: format!("no array is called `images`, and {count} of the others has three axes"),
+        message: format!("no array is called `images`, and {count} of the others has the axes of images"),
         help: Some("save the frames as `images`, with the axes [frames, rows, columns]".into()),
     })?;
     recording(NPZ.name, &unpack(&archive, &images)?, beside, hints)
@@ -86,10 +87,11 @@ fn unpack(archive: &Archive<'_>, file: &ZipFile<'_>) -> Result<Vec<u8>, Refusal>
     Ok(out)
 }
 
-fn has_three_axes(archive: &Archive<'_>, file: &ZipFile<'_>) -> Result<bool, Refusal> {
+/// Whether a file has the axes of images, or of vector images.
+fn has_images(archive: &Archive<'_>, file: &ZipFile<'_>) -> Result<bool, Refusal> {
     let mut head = Vec::new();
     zip::read(&mut *archive.open(file)?, &zip::name(file), 4096, &mut head)?;
-    Ok(Array::begin(&head).is_ok_and(|array| array.shape.len() == 3))
+    Ok(Array::begin(&head).is_ok_and(|array| matches!(array.shape[..], [_, _, _] | [_, _, _, 3])))
 }
 
 impl Beside {
@@ -131,7 +133,7 @@ fn recording(format: &'static str, file: &[u8], beside: Beside, hints: &Hints) -
     }
     let mut reel = Reel::default();
     reel.frames.reserve_exact(count);
-    reel.cells.reserve_exact(array.len());
+    reel.cells.reserve_exact(count * rows * cols);
     fill(&mut reel, &array, axes, found.factor(), time.as_deref()).map_err(Refusal::broken)?;
     found.size = Some([rows, cols]);
     found.period = reel.mean_step().or(found.period);
@@ -144,7 +146,7 @@ fn axes(array: &Array<'_>, hints: &Hints) -> Result<[usize; 3], Refusal> {
         return Err(Refusal::broken("the elements of the array are not numbers"));
     }
     let [count, rows, cols] = match *array.shape {
-        [count, rows, cols] => [count, rows, cols],
+        [count, rows, cols] | [count, rows, cols, 3] => [count, rows, cols],
         [count, tactels] => {
             let [rows, cols] = hints.size(None)?;
             if rows.checked_mul(cols) != Some(tactels) {
@@ -155,7 +157,10 @@ fn axes(array: &Array<'_>, hints: &Hints) -> Result<[usize; 3], Refusal> {
             [count, rows, cols]
         }
         _ => {
-            let message = format!("expected an array [frames, rows, columns], found {}", named(&array.shape));
+            let message = format!(
+                "expected an array [frames, rows, columns], or [frames, rows, columns, 3], found {}",
+                named(&array.shape)
+            );
             return Err(Refusal::broken(message));
         }
     };
@@ -165,8 +170,8 @@ fn axes(array: &Array<'_>, hints: &Hints) -> Result<[usize; 3], Refusal> {
         return Err(Refusal::broken("the array has no frame"));
     }
     // A frame in memory must not be many times larger than in the file.
-    let bytes = rows * cols * array.width;
-    if size_of::<Frame>() + 4 * rows * cols > 9 * bytes {
+    let bytes = array.len() / count * array.width;
+    if size_of::<Frame>() + 4 * array.len() / count > 9 * bytes {
         let help = Some("save the array with larger numbers, as `float64`".into());
         return Err(Refusal::Broken { message: format!("frames of {bytes} bytes are too small"), help });
     }
@@ -180,14 +185,27 @@ fn fill(
     factor: f64,
     times: Option<&[f64]>,
 ) -> Result<(), String> {
-    let is_flat = array.shape.len() == 2;
+    let axes = array.shape.len();
     for frame in 0..count {
         for tactel in 0..rows * cols {
             let (row, col) = (tactel / cols, tactel % cols);
-            let place = if is_flat { array.place(&[frame, tactel]) } else { array.place(&[frame, row, col]) };
-            let value = array.number(place) * factor;
-            reel.cell(value)
-                .map_err(|message| format!("frame {frame}, row {row}, column {col}: {message}: `{value:?}`"))?;
+            let value = |index: &[usize]| array.number(array.place(index)) * factor;
+            let z = match axes {
+                2 => value(&[frame, tactel]),
+                3 => value(&[frame, row, col]),
+                _ => value(&[frame, row, col, 2]),
+            };
+            let wrong =
+                |message: &str, value: f64| format!("frame {frame}, row {row}, column {col}: {message}: `{value:?}`");
+            reel.cell(z).map_err(|message| wrong(message, z))?;
+            if axes == 4 {
+                // A tactel that does not exist has no drag.
+                let drag = [0, 1].map(|axis| if z.is_nan() { 0.0 } else { value(&[frame, row, col, axis]) });
+                if let Some(value) = drag.into_iter().find(|value| !(*value as f32).is_finite()) {
+                    return Err(wrong("its x or y is not finite", value));
+                }
+                reel.drag.push(drag.map(|value| value as f32));
+            }
         }
         let time = times.map(|times| since_start(times, frame)).transpose()?;
         if reel.frames.last().is_some_and(|last| time.is_some_and(|time| time < last.time)) {

@@ -122,7 +122,10 @@ fn a_mistake_in_an_array_has_its_message() {
             "its header has [99999999999, 99999999999, 9] elements of 8 bytes, but 96 bytes come after it",
         ),
         (npy("<c16", false, "(2, 3, 1)", body), "elements of type `'<c16'` are not supported: save plain numbers"),
-        (npy("<f8", false, "(12,)", body), "expected an array [frames, rows, columns], found [12]"),
+        (
+            npy("<f8", false, "(12,)", body),
+            "expected an array [frames, rows, columns], or [frames, rows, columns, 3], found [12]",
+        ),
         (npy("<f8", false, "(2, 2, x)", body), "`shape` of the array is not a list of sizes"),
         (npy("<f8", false, "(0, 2, 3)", &[]), "the array has no frame"),
         (npy("<f8", false, "(2, 0, 3)", &[]), "an array needs at least one row and one column"),
@@ -158,7 +161,7 @@ fn a_mistake_in_an_archive_of_arrays_has_its_message() {
         (with("rate_hz.npy", &[50.0]), "the file has another value: 50 frames a second"),
         (
             zipped(0, &[("a.npy", &*images), ("b.npy", &*images)]),
-            "no array is called `images`, and more than one of the others has three axes",
+            "no array is called `images`, and more than one of the others has the axes of images",
         ),
         (zipped(0, &[("images.npy", &images[..100])]), "the header of the array is cut off"),
         (
@@ -202,4 +205,26 @@ proptest! {
         let expected = if bits >> 15 == 0 { expected } else { -expected };
         prop_assert!(value == expected || value.is_nan() && expected.is_nan(), "{bits:x}: {value}, {expected}");
     }
+}
+
+#[test]
+fn three_values_for_each_tactel_are_a_vector_image() {
+    let values: Vec<f64> = (0..36).map(f64::from).collect();
+    let recording = read(&npy("<f8", false, "(2, 2, 3, 3)", &floats(&values)), "a.npy", &hints()).unwrap();
+    assert!(recording.is_sound() && (recording.shape.rows, recording.shape.cols) == (2, 3));
+    let mut vectors = [[0.0; 3]; 6];
+    recording.show_vectors(1, &mut vectors);
+    assert_eq!(vectors.as_flattened(), (18..36).map(|i| i as f32).collect::<Vec<_>>());
+    let mut image = [0.0; 6];
+    recording.show(1, &mut image);
+    assert_eq!(image, [20.0, 23.0, 26.0, 29.0, 32.0, 35.0], "the image is z");
+    let mut broken = values.clone();
+    broken[19] = f64::NAN;
+    let refusal = complaints(read(&npy("<f8", false, "(2, 2, 3, 3)", &floats(&broken)), "a.npy", &hints()));
+    assert!(refusal[0].1.contains("frame 1, row 0, column 0: its x or y is not finite: `NaN`"), "{refusal:?}");
+    // A tactel that does not exist is NaN in z.
+    let mut dead = values;
+    [2, 20].iter().for_each(|i| dead[*i] = f64::NAN);
+    let recording = read(&npy("<f8", false, "(2, 2, 3, 3)", &floats(&dead)), "a.npy", &hints()).unwrap();
+    assert_eq!((recording.dead, recording.drag[0]), (vec![0], [0.0, 0.0]));
 }

@@ -22,8 +22,9 @@ use super::housing::{Housing, HousingModel};
 use super::joints::SimArm;
 use super::object::{Object, ObjectParams};
 use super::pad_model::PadModel;
-use super::readout::Readout;
+use super::readout::{Electronics, Readout};
 use super::shape::pose3;
+use super::vector_readout::{VectorElectronics, VectorReadout};
 use super::world::World;
 use crate::devices::arm::{self, ArmPorts};
 use crate::devices::wrench::{WrenchPorts, moved};
@@ -51,6 +52,9 @@ pub struct Params {
     arm: ArmModel,
     /// The housing of the pad, a hard capsule in the frame of the tip that objects touch; none if not given.
     housing: Option<HousingModel>,
+    /// The electronics of a pad with three axes, which also fills the role `three_axis_pad`; `{ }` for those of their
+    /// defaults. Without it the pad has one axis.
+    vectors: Option<VectorElectronics>,
     /// Longest step of the simulation.
     #[param(unit = "s", above = 0.0, default = 0.002)]
     step_s: f64,
@@ -161,7 +165,16 @@ impl Device for SimBench {
         check::check(&params, arm.joints.joints.len())?;
         let (period, latency) = (period_of(pad.rate_hz), nanos(pad.latency_s));
         let mut description = Description::every(period as f64 * 1e-9);
-        let image = pad::fill(description.fills(pad::ROLE), shape.clone(), pad.facts(&model.body.mount)?);
+        let facts = pad.facts(&model.body.mount)?;
+        let (image, vectors) = match &params.vectors {
+            None => (pad::fill(description.fills(pad::ROLE), shape.clone(), facts), None),
+            Some(electronics) => {
+                let facts = facts.into_iter().chain(electronics.facts(&pad.foam)).collect();
+                let (image, vectors) = pad::fill_three_axes(description.fills(pad::THREE_AXES), shape.clone(), facts);
+                let Electronics { serial, .. } = pad.electronics;
+                (image, Some((vectors, VectorReadout::new(pad.tactels(), electronics, serial, params.seed))))
+            }
+        };
         let joints = arm.joints.joints.clone();
         let ports = ArmPorts::fill(description.fills(arm::ROLE), &arm.joints, model.facts(&arm)?);
         let tactels = pad.tactels();
@@ -171,7 +184,7 @@ impl Device for SimBench {
             truth: TruthPorts::fill(&mut description, &shape),
             wrench: WrenchPorts::fill(&mut description, Vec::new()),
             mount: model.body.mount.pose(),
-            frames: Frames::new(image, readout, tactels, [period, latency]),
+            frames: Frames::new(image, readout, tactels, [period, latency]).with_vectors(vectors),
             joints,
             beats: Beats::new(period, params.for_s.map_or(i64::MAX, nanos)),
             sequence: 0,
@@ -193,7 +206,7 @@ fn world(params: &Params, arm: SimArm, shape: ImageShape) -> Result<World, Mista
     let objects = params.objects.iter().enumerate().map(place).collect::<Result<Vec<_>, _>>()?;
     let housing = params.housing.as_ref().map(|model| Housing::new(model, &params.arm.body.mount));
     let world = World::new(arm, objects, shape, params.pad.foam.clone(), params.pad.points_apart, params.step_s);
-    Ok(world.with_housing(housing))
+    Ok(world.with_housing(housing).with_drag(params.vectors.is_some()))
 }
 
 impl SimBench {
@@ -202,7 +215,7 @@ impl SimBench {
         let period = self.beats.period();
         for beat in self.beats.pass(now) {
             self.world.advance(beat as f64 * 1e-9, velocity);
-            self.frames.take(beat, period, self.world.image());
+            self.frames.take(beat, period, self.world.forces());
         }
         if now % period != 0 {
             self.world.advance(now as f64 * 1e-9, velocity);
@@ -275,6 +288,6 @@ impl SimBench {
             }
         }
         let cells = samples.write(self.truth.image, now, self.sequence).cells_mut();
-        cells.iter_mut().zip(self.world.image()).for_each(|(cell, force)| *cell = *force as f32);
+        cells.iter_mut().zip(&self.world.forces().normal).for_each(|(cell, force)| *cell = *force as f32);
     }
 }

@@ -216,7 +216,7 @@ impl SimPair {
         for beat in self.beats.pass(now) {
             self.world.advance(beat as f64 * 1e-9, velocity);
             for (side, arm) in self.sides.iter_mut().zip(&mut self.world.sides) {
-                side.frames.take(beat, period, arm.image());
+                side.frames.take(beat, period, arm.forces());
             }
         }
         if now % period != 0 {

@@ -10,7 +10,7 @@ use super::body::Body;
 use super::table::Table;
 use crate::sim::contact::{BodyMotion, Contact};
 use crate::sim::foam::Foam;
-use crate::sim::imprint::Imprint;
+use crate::sim::imprint::{Forces, Imprint};
 use crate::sim::joints::SimArm;
 use crate::sim::wrench::Wrench;
 
@@ -44,9 +44,9 @@ impl ArmAndPad {
         BodyMotion { pose: self.base * pose, linear: turn * linear, angular: turn * angular }
     }
 
-    /// Returns the noise-free image [N].
-    pub fn image(&mut self) -> &[f64] {
-        self.imprint.take(&self.contact.touching);
+    /// Returns the noise-free forces on the tactels.
+    pub fn forces(&mut self) -> &Forces {
+        self.imprint.take(&self.contact);
         &self.imprint.forces
     }
 

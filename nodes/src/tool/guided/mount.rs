@@ -3,10 +3,12 @@
 use tactflow_runtime::device::Description;
 
 use crate::arm::mount::Mount;
+use crate::devices::pad;
 
 /// Returns where a pad is on the tip of its arm, or `None` if the device states no `mount` for a pad on that side.
 pub(crate) fn stated(description: &Description, side: Option<&str>) -> Option<Mount> {
-    parse(description.fact_on(side, "tactile_pad", "mount")?)
+    let fact = |role| description.fact_on(side, role, "mount");
+    parse(fact(pad::ROLE).or_else(|| fact(pad::THREE_AXES))?)
 }
 
 fn parse(fact: &toml::Value) -> Option<Mount> {

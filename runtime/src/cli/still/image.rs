@@ -53,11 +53,38 @@ pub(crate) fn draw_image(svg: &mut Svg, image: &ImageHistory) {
             }
         }
     });
+    draw_drag(svg, raster, snapshot, scale, [x(1) - x(0), y(0) - y(1)]);
     let centre = [MARGIN + 0.5 * width, TOP + 0.5 * height];
     draw_mark(svg, snapshot, centre, width / lengths(&image.shape)[0]);
     let mark = if snapshot.mark.is_some() { "; + centre of the contact" } else { "" };
     draw_legend(svg, &format!("{}{mark}", image.shape.unit), scale, TOP + height + 10.0);
     svg.text([MARGIN, TOP + height + 10.0 + 2.6 * LINE], "start", &raster.describe());
+}
+
+/// Draws the drag of the object on each cell of a vector image, as a line from the middle of the cell; a tactel is `size`
+/// \[px\] wide and high.
+fn draw_drag(svg: &mut Svg, raster: Raster<'_>, snapshot: &Snapshot, scale: ColourScale, size: [f64; 2]) {
+    let cells = (0..raster.rows()).flat_map(|row| (0..raster.cols()).map(move |col| [row, col]));
+    let drags: Vec<([usize; 2], [f64; 2])> =
+        cells.filter_map(|[row, col]| Some(([row, col], raster.drag(snapshot, row, col, scale)?))).collect();
+    let largest = drags.iter().fold(0.0_f64, |largest, (_, [x, y])| largest.max(libm::hypot(*x, *y)));
+    if drags.is_empty() {
+        return;
+    }
+    let [width, height] = size.map(|size| size * raster.block as f64);
+    let bottom = TOP + size[1] * raster.shape.rows as f64;
+    svg.group("class=\"drag\" stroke=\"#3d85c6\" stroke-width=\"2\"", |svg| {
+        svg.put("<title>drag of the object</title>");
+        for ([row, col], drag) in drags {
+            let [x, y] = [MARGIN + (col as f64 + 0.5) * width, bottom - (row as f64 + 0.5) * height];
+            let [along, up] = drag.map(|part| part / largest);
+            svg.put(format_args!(
+                "<path d=\"M{x:.1} {y:.1}l{:.1} {:.1}\"/><circle cx=\"{x:.1}\" cy=\"{y:.1}\" r=\"1.5\"/>",
+                along * width,
+                -up * height
+            ));
+        }
+    });
 }
 
 /// Draws a cross at the centre of the contact.

@@ -15,6 +15,10 @@ const LEVELS: [u8; 6] = [0, 95, 135, 175, 215, 255];
 const MARK: &str = "><";
 /// Stands for a cell without any finite value.
 const NOT_FINITE: &str = "??";
+/// The directions of the drag of an object, from x toward y.
+const ARROWS: [char; 8] = ['→', '↗', '↑', '↖', '←', '↙', '↓', '↘'];
+/// Smallest drag that is drawn, as a fraction of the largest value [1].
+const MIN_DRAG: f64 = 0.05;
 const RESET: &str = "\x1b[0m";
 
 /// An image at one time.
@@ -22,8 +26,10 @@ const RESET: &str = "\x1b[0m";
 pub(crate) struct Snapshot {
     /// Time of the tick [ns].
     pub(crate) time: i64,
-    /// Values of the tactels, row by row.
+    /// Values of the tactels, row by row; of a vector image its z.
     pub(crate) cells: Vec<f32>,
+    /// x and y of the tactels of a vector image; empty for an image.
+    pub(crate) drag: Vec<[f32; 2]>,
     /// Sum of the finite values.
     pub(crate) sum: f64,
     /// Position of the contact [m], if there was one.
@@ -74,14 +80,27 @@ impl<'a> Raster<'a> {
         2 * self.cols()
     }
 
-    /// Returns the mean of the finite tactels of a cell, or `None` without any.
-    pub(crate) fn cell(self, snapshot: &Snapshot, row: usize, col: usize) -> Option<f64> {
+    /// Returns the indices of the tactels of a cell.
+    fn tactels(self, row: usize, col: usize) -> impl Iterator<Item = usize> {
         let ImageShape { rows, cols, .. } = *self.shape;
         let within = |index: usize, count: usize| index * self.block..((index + 1) * self.block).min(count);
-        let tactels = within(row, rows).flat_map(|i| &snapshot.cells[i * cols..][within(col, cols)]);
-        let finite = tactels.filter(|value| value.is_finite());
-        let (sum, count) = finite.fold((0.0, 0_u32), |(sum, count), value| (sum + f64::from(*value), count + 1));
-        (count > 0).then(|| sum / f64::from(count))
+        let columns = within(col, cols);
+        within(row, rows).flat_map(move |i| columns.clone().map(move |j| i * cols + j))
+    }
+
+    /// Returns the mean of the finite tactels of a cell, or `None` without any.
+    pub(crate) fn cell(self, snapshot: &Snapshot, row: usize, col: usize) -> Option<f64> {
+        mean(self.tactels(row, col).map(|tactel| snapshot.cells[tactel]))
+    }
+
+    /// Returns the mean drag of the tactels of a cell, or `None` if it is small against the scale, or unknown.
+    pub(crate) fn drag(self, snapshot: &Snapshot, row: usize, col: usize, scale: ColourScale) -> Option<[f64; 2]> {
+        let along = |axis: usize| {
+            mean(self.tactels(row, col).filter_map(|tactel| snapshot.drag.get(tactel)).map(|drag| drag[axis]))
+        };
+        let [x, y] = [along(0)?, along(1)?];
+        let smallest = MIN_DRAG * scale.high.max(-scale.low);
+        (libm::hypot(x, y) > smallest).then_some([x, y])
     }
 
     /// Returns the range of all cells of the snapshots, including zero.
@@ -97,7 +116,13 @@ impl<'a> Raster<'a> {
     pub(crate) fn lines(self, snapshot: &Snapshot, scale: ColourScale) -> Vec<String> {
         let mark = snapshot.mark.and_then(|at| self.cell_at(at));
         let line = |i: usize| {
-            let cell = |j: usize| self.cell_text(self.cell(snapshot, i, j), scale, mark == Some((i, j)));
+            let cell = |j: usize| {
+                let over = match mark == Some((i, j)) {
+                    true => Over::Mark,
+                    false => self.drag(snapshot, i, j, scale).map_or(Over::Nothing, Over::Drag),
+                };
+                self.cell_text(self.cell(snapshot, i, j), scale, over)
+            };
             let reset = if self.has_colour { RESET } else { "" };
             (0..self.cols()).map(cell).collect::<String>() + reset
         };
@@ -115,16 +140,22 @@ impl<'a> Raster<'a> {
     }
 
     /// Draws one cell in two characters.
-    fn cell_text(self, value: Option<f64>, scale: ColourScale, is_mark: bool) -> String {
+    fn cell_text(self, value: Option<f64>, scale: ColourScale, over: Over) -> String {
         let Some(value) = value else { return format!("{}{NOT_FINITE}", if self.has_colour { RESET } else { "" }) };
         let levels = if self.has_colour { COLOURS.len() } else { SHADES.len() };
         let level = scale.level(value, levels);
+        let shade = if self.has_colour { "  " } else { SHADES[level] };
+        let text = match over {
+            Over::Nothing => shade.to_owned(),
+            Over::Mark => MARK.to_owned(),
+            Over::Drag(drag) => format!("{}{}", &shade[..1], arrow(drag)),
+        };
         if !self.has_colour {
-            return if is_mark { MARK } else { SHADES[level] }.to_owned();
+            return text;
         }
         // Black on bright cells, white on dark cells.
         let ink = if 2 * level < levels { 231 } else { 16 };
-        format!("\x1b[48;5;{};38;5;{ink}m{}", COLOURS[level], if is_mark { MARK } else { "  " })
+        format!("\x1b[48;5;{};38;5;{ink}m{text}", COLOURS[level])
     }
 
     /// Draws all shades between the values they stand for.
@@ -132,7 +163,7 @@ impl<'a> Raster<'a> {
         let steps = if self.has_colour { COLOURS.len() } else { SHADES.len() };
         let step = |i: usize| {
             let value = scale.low + (scale.high - scale.low) * i as f64 / (steps - 1) as f64;
-            self.cell_text(Some(value), scale, false)
+            self.cell_text(Some(value), scale, Over::Nothing)
         };
         let reset = if self.has_colour { RESET } else { "" };
         let ramp: String = (0..steps).map(step).collect();
@@ -151,6 +182,29 @@ impl<'a> Raster<'a> {
         };
         format!("{rows}x{cols} tactels, {pitch} mm apart{mean}; x right, y up")
     }
+}
+
+/// What is drawn over the shade of a cell.
+#[derive(Debug, Clone, Copy)]
+enum Over {
+    Nothing,
+    /// The centre of the contact.
+    Mark,
+    /// The drag of the object along x and y.
+    Drag([f64; 2]),
+}
+
+/// Returns the arrow that is nearest to a direction.
+fn arrow([x, y]: [f64; 2]) -> char {
+    let eighths = libm::atan2(y, x) / std::f64::consts::FRAC_PI_4;
+    ARROWS[(eighths.round() as i64).rem_euclid(8) as usize]
+}
+
+/// Returns the mean of the values that are finite, or `None` without any.
+fn mean(values: impl Iterator<Item = f32>) -> Option<f64> {
+    let finite = values.filter(|value| value.is_finite());
+    let (sum, count) = finite.fold((0.0, 0_u32), |(sum, count), value| (sum + f64::from(value), count + 1));
+    (count > 0).then(|| sum / f64::from(count))
 }
 
 impl ColourScale {
@@ -212,6 +266,18 @@ mod tests {
             assert!(!raster.lines(&image, scale).concat().contains(MARK), "{outside:?}");
         }
         assert_eq!(raster.legend(scale, Unit::NEWTON), "0 . ::--==++**##%%@@ 8.000 N");
+    }
+
+    #[test]
+    fn arrows_show_where_the_object_drags() {
+        let shape = shape(1, 5);
+        let mut image = snapshot([8.0, 8.0, 0.0, 8.0, 8.0]);
+        image.drag = vec![[1.0, 0.1], [-0.5, -0.6], [0.0, 0.0], [0.2, 0.3], [f32::NAN, 1.0]];
+        let raster = Raster::new(&shape, 100, false);
+        assert_eq!(raster.lines(&image, raster.scale(&[&image])), ["@→@↙. @@@@"]);
+        let up = (0..8).map(|i| f64::from(i) * std::f64::consts::FRAC_PI_4);
+        let seen: Vec<char> = up.map(|angle| arrow([libm::cos(angle), libm::sin(angle)])).collect();
+        assert_eq!(seen, ARROWS);
     }
 
     #[test]

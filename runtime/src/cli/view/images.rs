@@ -5,7 +5,7 @@ use crate::cli::text::picture::{Raster, Snapshot};
 use crate::cli::text::prose::{PageStyle, break_at_semicolons};
 use crate::engine::Engine;
 use crate::node::{Bus, PortId};
-use crate::signal::{Freshness, Image, ImageShape, Scalar};
+use crate::signal::{Freshness, Image, ImageShape, Kind, Scalar, VectorImage};
 
 /// Narrower pages have captions above the curves [characters].
 pub(crate) const MIN_WIDE_PAGE: usize = 70;
@@ -19,7 +19,9 @@ pub(crate) struct ImageHistory {
     /// Name of the port in the graph file.
     pub(crate) name: String,
     pub(crate) shape: ImageShape,
+    /// The port, and its kind: an image or a vector image.
     id: PortId,
+    kind: Kind,
     /// Ports of the position of the contact.
     mark: Option<[PortId; 2]>,
     /// The first image with a contact, or the first image if the graph has no `mark`.
@@ -31,8 +33,8 @@ pub(crate) struct ImageHistory {
 }
 
 impl ImageHistory {
-    pub(crate) fn new(name: String, id: PortId, shape: ImageShape, mark: Option<[PortId; 2]>) -> Self {
-        Self { name, id, shape, mark, first: None, strongest: None, last: None }
+    pub(crate) fn new(name: String, (id, kind): (PortId, Kind), shape: ImageShape, mark: Option<[PortId; 2]>) -> Self {
+        Self { name, id, kind, shape, mark, first: None, strongest: None, last: None }
     }
 
     /// Adds the image of the last tick of the engine.
@@ -44,22 +46,18 @@ impl ImageHistory {
             self.last = self.last.take().filter(|_| freshness == Freshness::Held);
             return;
         }
-        let cells = bus.slot::<Image>(self.id).cells();
-        let sum = cells.iter().filter(|value| value.is_finite()).map(|value| f64::from(*value)).sum();
-        let (time, is_first) = (engine.now(), mark.is_some() || self.mark.is_none());
-        let keep = |snapshot: &mut Option<Snapshot>| {
-            // The buffer of the previous snapshot is reused.
-            let mut kept = snapshot.take().map(|snapshot| snapshot.cells).unwrap_or_default();
-            cells.clone_into(&mut kept);
-            *snapshot = Some(Snapshot { time, cells: kept, sum, mark });
-        };
+        // The buffers of the snapshots before are reused.
+        let mut newest = self.last.take().unwrap_or_default();
+        (newest.time, newest.mark) = (engine.now(), mark);
+        newest.read(bus, self.id, self.kind);
+        let is_first = mark.is_some() || self.mark.is_none();
         if self.first.is_none() && is_first {
-            keep(&mut self.first);
+            self.first = Some(newest.clone());
         }
-        if self.strongest.as_ref().is_none_or(|strongest| sum > strongest.sum) {
-            keep(&mut self.strongest);
+        if self.strongest.as_ref().is_none_or(|strongest| newest.sum > strongest.sum) {
+            self.strongest.get_or_insert_default().copy_from(&newest);
         }
-        keep(&mut self.last);
+        self.last = Some(newest);
     }
 
     /// Returns at most `count` snapshots with their captions, in the order of time.
@@ -119,7 +117,35 @@ impl ImageHistory {
             true if page < MIN_WIDE_PAGE => ";\n  >< centre of the contact",
             true => "; >< centre of the contact",
         };
-        text + &raster.legend(scale, self.shape.unit) + mark + "\n"
+        let drag = match self.kind {
+            Kind::VectorImage => "\n  arrows: the drag of the object, where it is not small",
+            _ => "",
+        };
+        text + &raster.legend(scale, self.shape.unit) + mark + drag + "\n"
+    }
+}
+
+impl Snapshot {
+    /// Reads the values of the image, or of the vector image, in a port.
+    fn read(&mut self, bus: &Bus, id: PortId, kind: Kind) {
+        self.cells.clear();
+        self.drag.clear();
+        if kind == Kind::VectorImage {
+            let vectors = bus.slot::<VectorImage>(id).cells();
+            self.cells.extend(vectors.iter().map(|[.., z]| *z));
+            self.drag.extend(vectors.iter().map(|[x, y, _]| [*x, *y]));
+        } else {
+            self.cells.extend_from_slice(bus.slot::<Image>(id).cells());
+        }
+        self.sum = self.cells.iter().filter(|value| value.is_finite()).map(|value| f64::from(*value)).sum();
+    }
+
+    /// Copies another one into its own buffers.
+    fn copy_from(&mut self, other: &Self) {
+        let Self { time, cells, drag, sum, mark } = self;
+        (*time, *sum, *mark) = (other.time, other.sum, other.mark);
+        cells.clone_from(&other.cells);
+        drag.clone_from(&other.drag);
     }
 }
 

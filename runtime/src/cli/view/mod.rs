@@ -10,7 +10,7 @@ use crate::cli::text::prose::{PageStyle, break_at_semicolons};
 use crate::cli::text::series::{Series, SeriesBin};
 use crate::engine::{DisplayedPort, Engine};
 use crate::record::{PortColumn, PortColumns};
-use crate::signal::{Shape, Unit};
+use crate::signal::{Shape, Unit, VectorImageShape};
 use images::{ImageHistory, MIN_WIDE_PAGE};
 
 /// Share of the run at its end for which mean and deviation are printed [1].
@@ -53,8 +53,8 @@ impl RunView {
         let mut images: Vec<ImageHistory> = Vec::new();
         let (mut plotted, mut ports) = (Vec::new(), Vec::new());
         for DisplayedPort { name, port, id, mark } in engine.display() {
-            if let Shape::Image(shape) = &port.shape {
-                images.push(ImageHistory::new(name.clone(), *id, shape.clone(), *mark));
+            if let Shape::Image(shape) | Shape::VectorImage(VectorImageShape(shape)) = &port.shape {
+                images.push(ImageHistory::new(name.clone(), (*id, port.shape.kind()), shape.clone(), *mark));
             } else {
                 plotted.push(name.clone());
                 ports.push((port.clone(), *id));

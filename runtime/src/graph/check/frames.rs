@@ -240,7 +240,7 @@ const fn rank(kind: Kind) -> u8 {
         Kind::Pose => 0,
         Kind::Jacobian => 1,
         Kind::Joints => 2,
-        Kind::Image | Kind::Mask | Kind::Regions => 3,
+        Kind::Image | Kind::VectorImage | Kind::Mask | Kind::Regions => 3,
         _ => 4,
     }
 }

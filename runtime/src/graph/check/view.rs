@@ -82,7 +82,7 @@ fn check_task(
         Some(source)
     });
     let mark: Option<[PortRef; 2]> = mark.collect::<Vec<_>>().try_into().ok();
-    let is_image = |shown: &&mut PlannedShow| net.port(shown.source).kind == Kind::Image;
+    let is_image = |shown: &&mut PlannedShow| net.port(shown.source).kind.is_picture();
     let image = ports.iter_mut().flatten().find(is_image);
     let marked = mark.into_iter().flatten().chain(image.iter().map(|image| image.source));
     diagnostics.extend(mark.and_then(|_| of_two_sensors(net, table, marked)));
@@ -158,7 +158,8 @@ fn default_ports(nodes: &[PlannedNode], ports: &BTreeMap<PortRef, PlannedPort>) 
     let roles: Vec<PortRef> = ports.keys().copied().filter(is_role).collect();
     let of_nodes = nodes.iter().flat_map(PlannedNode::outputs).map(|(source, _)| source);
     let all: Vec<PortRef> = of_nodes.chain(roles.iter().copied()).collect();
-    let mut shown: Vec<PortRef> = roles.iter().copied().filter(of_kind(Kind::Image)).collect();
+    let is_picture = |source: &PortRef| ports.get(source).is_some_and(|port| port.shape.kind().is_picture());
+    let mut shown: Vec<PortRef> = roles.iter().copied().filter(is_picture).collect();
     let Some(kind) = KINDS.into_iter().find(|kind| all.iter().any(of_kind(*kind))) else { return shown };
     let mut count = 0;
     shown.extend(all.into_iter().filter(of_kind(kind)).take_while(|source| {

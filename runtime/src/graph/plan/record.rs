@@ -24,7 +24,8 @@ impl RecordedPorts {
     /// Whether a port is recorded.
     #[must_use]
     pub fn has(&self, port: &PlannedPort) -> bool {
-        let is_image = matches!(port.shape.kind(), Kind::Image | Kind::Mask);
+        let kind = port.shape.kind();
+        let is_image = kind.is_picture() || kind == Kind::Mask;
         let is_selected = |patterns: &Vec<String>| patterns.iter().any(|pattern| matches(pattern, &port.name));
         (self.has_images || !is_image) && self.patterns.as_ref().is_none_or(is_selected)
     }

@@ -83,7 +83,7 @@ impl Spoilt {
         let (mut images, mut commands, mut world) = (Vec::new(), Vec::new(), Vec::new());
         let mut taken: Vec<(usize, Vec<usize>)> = Vec::new();
         for (_, one) in injections {
-            if let Target::Image(port, shape) = &one.target {
+            if let Target::Image(port, _, shape) = &one.target {
                 let taken = of_port(&mut taken, |(known, _)| known == port, || (*port, Vec::new()));
                 taken.1.extend(listed(&one.table, shape));
             }
@@ -91,15 +91,18 @@ impl Spoilt {
         for (number, one) in injections {
             let (table, mut random) = (&one.table, Random::new(seed, *number as u64));
             match &one.target {
-                Target::Image(port, shape) => {
+                Target::Image(port, vectors, shape) => {
                     let taken = of_port(&mut taken, |(known, _)| known == port, || (*port, Vec::new()));
                     let cells = match table.cells.as_ref().map(|cells| &cells.value) {
                         Some(Cells::Count(count)) => draw(*count, [shape.rows, shape.cols], &mut taken.1, &mut random),
                         _ => listed(table, shape),
                     };
-                    let new = || SpoiltImage::new(*port, shape.tactels());
-                    let image = of_port(&mut images, |known: &SpoiltImage| known.port == *port, new);
-                    image.faults.push(Fault::new(table, cells, random));
+                    // The same random numbers: what hits a frame hits both of its images.
+                    for (port, axes) in std::iter::once((*port, 1)).chain(vectors.map(|port| (port, 3))) {
+                        let new = || SpoiltImage::new(port, axes, shape.tactels());
+                        let image = of_port(&mut images, |known: &SpoiltImage| known.port == port, new);
+                        image.faults.push(Fault::new(table, cells.clone(), random.clone()));
+                    }
                 }
                 Target::Command(port, joints) => {
                     let new = || SpoiltCommand::new(*port);

@@ -63,14 +63,17 @@ impl Fault {
         is_hit.then_some(self.kind)
     }
 
-    /// Spoils the cells of a frame that was sampled at `stamp` [ns], if the fault concerns values.
-    pub(super) fn spoil(&mut self, kind: FaultKind, stamp: i64, image: &mut [f32]) {
+    /// Spoils the tactels of a frame that was sampled at `stamp` [ns], if the fault concerns values: with so many `axes`,
+    /// each of their values.
+    pub(super) fn spoil(&mut self, kind: FaultKind, stamp: i64, axes: usize, image: &mut [f32]) {
         let number = self.number as f32;
         let mut each = |change: &dyn Fn(f32) -> f32| {
             if self.cells.is_empty() {
                 image.iter_mut().for_each(|cell| *cell = change(*cell));
             }
-            self.cells.iter().for_each(|cell| image[*cell] = change(image[*cell]));
+            for cell in &self.cells {
+                image[axes * cell..][..axes].iter_mut().for_each(|value| *value = change(*value));
+            }
         };
         match kind {
             FaultKind::Dead => each(&|_| 0.0),
@@ -82,9 +85,16 @@ impl Fault {
                 each(&|cell| cell + by);
             }
             FaultKind::Garbage => {
-                image.iter_mut().for_each(|cell| *cell = self.random.uniform(0.0, self.number) as f32);
+                // One draw for each tactel, so that a vector image takes as many as its image.
+                for tactel in image.chunks_exact_mut(axes) {
+                    tactel.fill(self.random.uniform(0.0, self.number) as f32);
+                }
             }
-            FaultKind::Swapped => self.cells.windows(2).for_each(|pair| image.swap(pair[0], pair[1])),
+            FaultKind::Swapped => {
+                for pair in self.cells.windows(2) {
+                    (0..axes).for_each(|axis| image.swap(axes * pair[0] + axis, axes * pair[1] + axis));
+                }
+            }
             _ => {}
         }
     }

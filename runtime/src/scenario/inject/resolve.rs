@@ -3,7 +3,7 @@
 use super::table::{Cells, InjectTable, Spoils};
 use crate::device::{Disturbance, Driver};
 use crate::graph::{Compiled, into_diagnostic};
-use crate::signal::{ImageShape, Shape};
+use crate::signal::{ImageShape, Shape, VectorImageShape};
 use crate::source::{Code, Diagnostic, quoted};
 
 /// A checked fault, and what it spoils.
@@ -19,8 +19,9 @@ pub(crate) struct Injection {
 /// What a fault spoils.
 #[derive(Debug, Clone)]
 pub(super) enum Target {
-    /// An image: the index of the output among those of the device, and its shape.
-    Image(usize, ImageShape),
+    /// An image: the index of the output among those of the device, that of the vector image of the same tactels if there
+    /// is one, and the shape.
+    Image(usize, Option<usize>, ImageShape),
     /// A command: its index among those of the device, and the indices of the joints that stop.
     Command(usize, Vec<usize>),
     /// The world that the device simulates.
@@ -61,6 +62,10 @@ fn of_image(mut table: InjectTable, compiled: &Compiled) -> Result<Injection, Bo
         let names: Vec<&str> = images.map(|(role, ..)| role.name.as_str()).collect();
         return Err(wrong_role(&table, compiled, &names).into());
     };
+    let mut ports = role.ports.iter().zip(&role.numbers);
+    let vectors =
+        ports.find(|(port, _)| matches!(&port.shape, Shape::VectorImage(VectorImageShape(own)) if own == shape));
+    let vectors = vectors.map(|(_, number)| *number);
     let (device, port, shape) = (role.device, port, shape.clone());
     if let Some(cells) = &table.cells
         && let Some(message) = outside(&cells.value, &shape)
@@ -71,7 +76,7 @@ fn of_image(mut table: InjectTable, compiled: &Compiled) -> Result<Injection, Bo
     if let Some(reading) = &mut table.reading {
         reading.settle(Some(shape.unit), &mut Vec::new()).map_err(into_diagnostic)?;
     }
-    Ok(Injection { device, target: Target::Image(port, shape), table })
+    Ok(Injection { device, target: Target::Image(port, vectors, shape), table })
 }
 
 fn of_command(table: InjectTable, compiled: &Compiled) -> Result<Injection, Box<Diagnostic>> {

@@ -8,7 +8,7 @@ use super::table::{InjectBlock, blocks};
 use crate::device::{Commands, Description, DeviceError, Disturbance, Output, Samples, Stepped};
 use crate::node::Reader;
 use crate::random::Random;
-use crate::signal::{Image, ImageShape, Unit};
+use crate::signal::{Image, ImageShape, Unit, VectorImage, VectorImageShape};
 use crate::source::{SourceMap, parse_table};
 
 const FRAMES: u64 = 1000;
@@ -51,7 +51,7 @@ fn run(text: &str, seed: u64) -> (Vec<Arrived>, u64) {
     assert_eq!(mistakes, [""; 0], "{text}");
     let injection = |block: InjectBlock| {
         let table = block.table.expect("no mistake");
-        Injection { device: 0, target: Target::Image(0, SHAPE), table }
+        Injection { device: 0, target: Target::Image(0, None, SHAPE), table }
     };
     let injections: Vec<Injection> = blocks.into_iter().map(injection).collect();
     let numbered: Vec<(usize, &Injection)> = injections.iter().enumerate().collect();
@@ -265,5 +265,61 @@ fn each_mistake_in_the_keys_of_a_fault_is_reported_once() {
         ("fault = \"dead\"\ncells = []", "expected a number of cells, or a list of `[row, column]`, found a list of 0"),
     ] {
         assert_eq!(entries(&entry(text)).1, [message]);
+    }
+}
+
+/// The ramp of a pad with three axes: x is the reading, y twice as much, and z the reading again.
+struct ThreeAxes;
+
+impl Stepped for ThreeAxes {
+    fn next(&self) -> Option<i64> {
+        None
+    }
+
+    fn exchange(&mut self, now: i64, commands: &Commands, samples: &mut Samples) -> Result<(), DeviceError> {
+        Ramp.exchange(now, commands, samples)?;
+        let frame = now as u64 / 1_000_000;
+        let vectors = good(frame).into_iter().map(|value| [value, 2.0 * value, value]).collect::<Vec<_>>();
+        samples.write(Output::<VectorImage>::at(1), now, frame + 1).cells_mut().copy_from_slice(&vectors);
+        Ok(())
+    }
+}
+
+#[test]
+fn what_hits_a_frame_hits_both_of_its_images() {
+    let faults = [
+        "fault = \"dead\"\ncells = [[0, 1]]",
+        "fault = \"gain\"\nfactor = 2",
+        "fault = \"spike\"\ncells = [[0, 0]]\nreading = 7.5\nrate = 0.3",
+        "fault = \"swapped\"\ncells = [[0, 0], [1, 2]]",
+        "fault = \"missing\"\nrate = 0.3",
+        "fault = \"repeat\"\nrate = 0.3",
+        "fault = \"garbage\"\nreading = 50\nrate = 0.3",
+        "fault = \"late\"\ndelay_ms = 3",
+        "fault = \"jitter\"\ndelay_ms = 3",
+    ];
+    for text in faults {
+        let (blocks, mistakes) = entries(&entry(text));
+        assert_eq!(mistakes, [""; 0], "{text}");
+        let table = blocks.into_iter().next().and_then(|block| block.table).expect("no mistake");
+        let injection = Injection { device: 0, target: Target::Image(0, Some(1), SHAPE), table };
+        let mut description = Description::every(0.001);
+        let mut pad = description.fills("pad");
+        pad.output::<Image>("image", SHAPE);
+        pad.output::<VectorImage>("vectors", VectorImageShape(SHAPE));
+        let (mut samples, commands) = (Samples::of(&description), Commands::of(&description));
+        let mut device = Spoilt::new(Box::new(ThreeAxes), Samples::of(&description), &[(0, &injection)], 3);
+        let mut is_spoilt = false;
+        for frame in 0..FRAMES {
+            device.exchange(frame as i64 * 1_000_000, &commands, &mut samples).expect("the device does not fail");
+            let [image, vectors] = [0, 1].map(|port| (samples.ports[port].stamp, samples.ports[port].writes));
+            assert_eq!(image, vectors, "{text}: frame {frame}");
+            let Some(image) = samples.get(Output::<Image>::at(0)) else { continue };
+            let vectors = samples.get(Output::<VectorImage>::at(1)).expect("both are written");
+            let normal: Vec<f32> = vectors.cells().iter().map(|[.., z]| *z).collect();
+            assert_eq!(image.cells(), normal, "{text}: frame {frame}");
+            is_spoilt |= image.cells() != good(frame);
+        }
+        assert!(is_spoilt, "{text}");
     }
 }

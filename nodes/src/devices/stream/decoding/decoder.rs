@@ -120,9 +120,9 @@ pub(crate) struct Image {
 
 impl Image {
     /// Writes the cells. Returns whether all are finite.
-    pub(crate) fn write(&self, values: &[f64], cells: &mut [f32]) -> bool {
+    pub(crate) fn write<'c>(&self, values: &[f64], cells: impl IntoIterator<Item = &'c mut f32>) -> bool {
         let mut is_finite = true;
-        for (cell, place) in cells.iter_mut().zip(&self.places) {
+        for (cell, place) in cells.into_iter().zip(&self.places) {
             *cell = (values[*place] * self.gain + self.offset) as f32;
             is_finite &= cell.is_finite();
         }

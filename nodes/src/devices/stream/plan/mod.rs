@@ -38,6 +38,8 @@ pub(crate) struct Plan {
     pub(crate) decoder: Decoder,
     pub(crate) parts: Option<Parts>,
     pub(crate) image: Image,
+    /// Of a pad with three axes: its x, y and z.
+    pub(crate) vectors: Option<[Image; 3]>,
     /// Number of values of an image, with those of all axes.
     pub(crate) values: usize,
     pub(crate) stamps: Option<Stamps>,
@@ -79,6 +81,16 @@ impl Plan {
         if !mistakes.is_empty() {
             return Err(mistakes);
         }
+        let along = |axis: usize, gain: f64, offset: f64| Image {
+            places: places.iter().map(|cell| cell * shape.axes + axis).collect(),
+            gain,
+            offset,
+        };
+        let image = along(shape.axis, scale.0, scale.1);
+        let gain = params.scale.gain;
+        let vectors = shape
+            .tangential
+            .map(|[(x, turn), (y, other)]| [along(x, turn * gain, 0.0), along(y, other * gain, 0.0), image.clone()]);
         let period = Duration::from_secs_f64(1.0 / params.rate_hz);
         let timeout = params.timeout_ms.map(|ms| Duration::from_secs_f64((ms * 1e-3).min(1e6)));
         let stamp =
@@ -96,11 +108,8 @@ impl Plan {
             decoder: frame.decoder,
             parts,
             values: shape.values(),
-            image: Image {
-                places: places.into_iter().map(|cell| cell * shape.axes + shape.axis).collect(),
-                gain: scale.0,
-                offset: scale.1,
-            },
+            image,
+            vectors,
             stamps: stamp,
             counter: params.clock.counter.map(Counter::new),
             repeats_are_new: params.repeats_are_new,

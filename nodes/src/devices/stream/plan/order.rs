@@ -15,6 +15,8 @@ pub(crate) struct Shape {
     pub(crate) axes: usize,
     /// The axis that becomes the image.
     pub(crate) axis: usize,
+    /// The axes along the image's x and y, and their signs.
+    pub(crate) tangential: Option<[(usize, f64); 2]>,
 }
 
 impl Shape {
@@ -43,7 +45,9 @@ pub(crate) fn shape(params: &Params, mistakes: &mut Mistakes) -> Option<Shape> {
         return None;
     }
     let axis = axis(params, axes, mistakes)?;
-    Some(Shape { rows, cols, axes, axis })
+    let before = mistakes.len();
+    let tangential = params.tangential.as_ref().and_then(|names| tangential(params, names, axis, mistakes));
+    (mistakes.len() == before).then_some(Shape { rows, cols, axes, axis, tangential })
 }
 
 /// Returns the axis that becomes the image.
@@ -82,6 +86,36 @@ fn axis(params: &Params, axes: usize, mistakes: &mut Mistakes) -> Option<usize> 
         mistakes.push(mistake.suggest(wanted, names(), "axes"));
     }
     found
+}
+
+/// Returns the axes along x and y of the image, and their signs.
+fn tangential(params: &Params, names: &[String], axis: usize, mistakes: &mut Mistakes) -> Option<[(usize, f64); 2]> {
+    let wrong = |message: String| Mistake::param("tangential", message);
+    if params.axes.len() < 3 {
+        let help = "leave it out, or write `shape = [rows, cols, axes]` with three `axes` or more";
+        mistakes.push(wrong("a vector image needs three axes".into()).help(help));
+        return None;
+    }
+    let [x, y] = names else {
+        let mistake = wrong(format!("`tangential` has {} names", names.len()));
+        mistakes.push(mistake.help("write the axes along x and y of the image: `tangential = [\"x\", \"y\"]`"));
+        return None;
+    };
+    let mut find = |name: &String| {
+        let (sign, plain) = name.strip_prefix('-').map_or((1.0, name.as_str()), |plain| (-1.0, plain));
+        let known = || params.axes.iter().map(String::as_str);
+        let found = known().position(|known| known == plain);
+        if found.is_none() {
+            mistakes.push(wrong(format!("no axis is called `{plain}`")).suggest(plain, known(), "axes"));
+        }
+        found.map(|found| (found, sign))
+    };
+    let [x, y] = [find(x)?, find(y)?];
+    if x.0 == y.0 || x.0 == axis || y.0 == axis {
+        mistakes.push(wrong("x, y and the `axis` of the image must be three axes".into()).help("name each axis once"));
+        return None;
+    }
+    Some([x, y])
 }
 
 /// Returns the values that each axis can have.

@@ -84,6 +84,10 @@ pub struct Params {
     pub(crate) axes: Vec<String>,
     /// The axis that becomes the image.
     pub(crate) axis: Option<String>,
+    /// Of a pad with three axes: the axes of the drag along the image's x and y, after `order`. A minus sign turns one
+    /// around: `["x", "-y"]`. The pad then has a vector image too, with `axis` as its z. `scale` applies to z, and its
+    /// `gain` alone to x and y.
+    pub(crate) tangential: Option<Vec<String>>,
     /// The least and the greatest value of an axis, as it is in the frame; of a pad without axes, of `value`. A frame
     /// with another value is no frame.
     #[param(unit = "raw", default = Map(std::collections::BTreeMap::new()))]

@@ -1,0 +1,349 @@
+//! `calibrate_vectors`: from the readings of a pad with three axes to forces.
+//!
+//! The frames at rest are two halves. With the means m1, m2 and the variances v1, v2 of an axis of a tactel over h frames
+//! each, the zero is (m1 + m2) / 2. The axis is steady if |m2 - m1| is at most 6 sqrt((v1 + v2) / h).
+
+use tactflow_runtime::node::{
+    Describe, In, Inputs, Limits, Mistake, Mistakes, Node, Out, Outputs, Param, Setup, State, Tick, refuse_any,
+};
+use tactflow_runtime::signal::{Flag, ImageShape, Unit, VectorImage, VectorImageShape};
+
+/// Converts the readings of a pad with three axes to forces [N]: `force = gain (value - zero)`, along x, y and z.
+///
+/// **At rest.** The first `rest_frames` frames show the zero of each axis of each tactel, while nothing may touch the pad.
+/// Until they are over, the output is absent. If an axis is not steady meanwhile, the frames are repeated once; the second
+/// failure ends the task, and the fault names the tactel. A touch that does not change at all cannot be seen: wire the
+/// image of the pad to `calibrate`, whose self-test compares the zeros with those of the calibration.
+///
+/// The operator takes the zeros anew with the word `tare`, while the task is halted. It is refused while a reading is off
+/// its zero by more than eight times the noise. A pad that was lost and comes back rests again.
+///
+/// ```toml
+/// [nodes.calibrate_vectors]
+/// type = "calibrate_vectors"
+/// in.vectors = "pad.vectors"
+/// gain = { from = "pad.vector_gain" } # [N per raw, along x, y and z]
+/// rest_frames = 20                    # 80 ms of a pad with 250 frames per second
+/// ```
+#[derive(Describe)]
+pub struct CalibrateVectors {
+    params: Params,
+    shape: ImageShape,
+}
+
+/// Parameters of `calibrate_vectors`.
+#[derive(Debug, Clone, Param)]
+pub struct Params {
+    /// Force per reading along x, y and z; a negative number turns an axis around.
+    #[param(unit = "N/U")]
+    gain: [f64; 3],
+    /// Number of frames at rest, at least 16; 0 if the zeros are 0.
+    #[param(range = 0..=1_000_000, default = 40)]
+    rest_frames: usize,
+}
+
+/// What `calibrate_vectors` reads.
+#[derive(Inputs)]
+pub struct Inputs<'a> {
+    /// The vector image as measured.
+    #[port(unit = "U", frame = "A", quantity = "three_axis_image")]
+    vectors: Option<In<'a, VectorImage>>,
+}
+
+/// What `calibrate_vectors` writes.
+#[derive(Outputs)]
+pub struct Outputs {
+    /// The force on each tactel.
+    #[port(unit = "N", frame = "A", quantity = "three_axis_image")]
+    vectors: Out<VectorImage>,
+    /// Whether the pad did not rest; absent before the end of the frames at rest.
+    failed: Out<Flag>,
+}
+
+/// What `calibrate_vectors` remembers.
+#[derive(State)]
+pub struct State {
+    rest: Rest,
+    /// The zero of each axis of each tactel [unit of the input].
+    zeros: Vec<f32>,
+    /// Mean noise of an axis at rest [unit of the input].
+    noise: f64,
+}
+
+/// Where the frames at rest are.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+enum Phase {
+    Resting {
+        frames: usize,
+        is_second: bool,
+    },
+    #[default]
+    Passed,
+    /// An axis of a tactel, by its index among all axes, is not steady.
+    Failed(usize),
+}
+
+/// The frames at rest.
+#[derive(Debug, State)]
+struct Rest {
+    phase: Phase,
+    /// First reading of each axis.
+    first: Vec<f32>,
+    /// For each axis and each half: the sum and the sum of squares, of the difference from the first reading.
+    sums: Vec<[[f64; 2]; 2]>,
+}
+
+/// Number of standard deviations of the difference of two means that are no chance.
+const SIGNIFICANT: f64 = 6.0;
+/// A reading that is off its zero by that many times the noise is no noise.
+const FREE: f64 = 8.0;
+/// Smallest number of frames at rest, if there are any: with fewer, a steady drift hides behind its own variance.
+const MIN_FRAMES: usize = 16;
+
+impl Node for CalibrateVectors {
+    type Params = Params;
+    type Inputs<'a> = Inputs<'a>;
+    type Outputs = Outputs;
+    type State = State;
+
+    const LIMITS: Limits = Limits { fails: Some("failed"), ..Limits::NONE };
+
+    fn new(params: Params, setup: &mut Setup<Self>) -> Result<Self, Mistakes> {
+        let vectors = setup.inputs.vectors.clone();
+        let VectorImageShape(shape) = vectors.expect("the check of a graph reports an input without a wire");
+        let mut mistakes = Mistakes::new();
+        if params.gain.contains(&0.0) {
+            mistakes.push(Mistake::param("gain", "an axis with a gain of 0 measures nothing"));
+        }
+        if (1..MIN_FRAMES).contains(&params.rest_frames) {
+            let message = format!("{} frames are too few to see whether the pad rests", params.rest_frames);
+            let mistake = Mistake::param("rest_frames", message);
+            mistakes.push(mistake.help(format!("at least {MIN_FRAMES} frames, or 0 if the zeros are 0")));
+        }
+        refuse_any(mistakes)?;
+        setup.outputs.vectors = VectorImageShape(ImageShape { unit: Unit::NEWTON, ..shape.clone() });
+        Ok(Self { params, shape })
+    }
+
+    fn state(&self) -> State {
+        let values = 3 * self.shape.tactels();
+        let phase = if self.params.rest_frames == 0 { Phase::Passed } else { Phase::FIRST };
+        let rest = Rest { phase, first: vec![0.0; values], sums: vec![[[0.0; 2]; 2]; values] };
+        State { rest, zeros: vec![0.0; values], noise: 0.0 }
+    }
+
+    fn found(&self, state: &State) -> Option<String> {
+        match state.rest.phase {
+            Phase::Failed(value) => {
+                let (tactel, axis) = (value / 3, ["x", "y", "z"][value % 3]);
+                let (row, col) = (tactel / self.shape.cols, tactel % self.shape.cols);
+                let frames = self.params.rest_frames;
+                Some(format!(
+                    "the pad did not rest: {axis} of row {row}, column {col} changed within {frames} frames; start again \
+                     while nothing touches the pad"
+                ))
+            }
+            Phase::Passed if self.params.rest_frames > 0 => {
+                Some(format!("the pad rested with a noise of {:.3} {} along an axis", state.noise, self.shape.unit))
+            }
+            _ => None,
+        }
+    }
+
+    fn returned(&self, state: &mut State) {
+        if self.params.rest_frames > 0 {
+            state.rest.phase = Phase::FIRST;
+        }
+    }
+
+    fn can_tare(&self, inputs: Inputs<'_>, state: &State) -> Option<Result<(), String>> {
+        (self.params.rest_frames > 0).then(|| self.is_free(&inputs, state))
+    }
+
+    fn tare(&self, state: &mut State) {
+        self.returned(state);
+    }
+
+    fn step(&self, _: &Tick, inputs: Inputs<'_>, out: &mut Outputs, state: &mut State) {
+        out.failed.keep();
+        // The zeros outlast an absence: a pad that is in contact cannot rest again.
+        let Some(vectors) = inputs.vectors else { return };
+        let values = vectors.cells().as_flattened();
+        if matches!(state.rest.phase, Phase::Resting { .. }) && vectors.is_new() {
+            self.rest(values, state);
+            match state.rest.phase {
+                Phase::Resting { .. } => {}
+                Phase::Passed => out.failed.set(false),
+                Phase::Failed(_) => out.failed.set(true),
+            }
+        }
+        if state.rest.phase != Phase::Passed {
+            return;
+        }
+        if !vectors.is_new() {
+            return out.vectors.keep();
+        }
+        let forces = out.vectors.write().cells_mut().as_flattened_mut();
+        let gain = self.params.gain.map(|gain| gain as f32);
+        for (i, ((force, value), zero)) in forces.iter_mut().zip(values).zip(&state.zeros).enumerate() {
+            *force = gain[i % 3] * (value - zero);
+        }
+    }
+}
+
+impl Phase {
+    const FIRST: Self = Self::Resting { frames: 0, is_second: false };
+}
+
+impl CalibrateVectors {
+    /// Adds a frame at rest, and judges them all after the last one.
+    #[cold]
+    fn rest(&self, values: &[f32], state: &mut State) {
+        let State { rest, zeros, noise } = state;
+        let Phase::Resting { frames, is_second } = rest.phase else { return };
+        if frames == 0 {
+            rest.first.copy_from_slice(values);
+            rest.sums.fill([[0.0; 2]; 2]);
+        }
+        let [first, second] = self.halves();
+        let half = usize::from(frames >= first);
+        for ((sums, value), first) in rest.sums.iter_mut().zip(values).zip(&rest.first) {
+            let difference = f64::from(value - first);
+            sums[half][0] += difference;
+            sums[half][1] += difference * difference;
+        }
+        if frames + 1 < first + second {
+            rest.phase = Phase::Resting { frames: frames + 1, is_second };
+            return;
+        }
+        let counts = [first as f64, second as f64];
+        let judged = |sums: &[[f64; 2]; 2]| {
+            [0, 1].map(|half| {
+                let mean = sums[half][0] / counts[half];
+                [mean, (sums[half][1] / counts[half] - mean * mean).max(0.0)]
+            })
+        };
+        let is_unsteady = |sums: &[[f64; 2]; 2]| {
+            let [[m1, v1], [m2, v2]] = judged(sums);
+            (m2 - m1).abs() > SIGNIFICANT * (v1 / counts[0] + v2 / counts[1]).sqrt()
+        };
+        rest.phase = match rest.sums.iter().position(is_unsteady) {
+            None => Phase::Passed,
+            Some(_) if !is_second => Phase::Resting { frames: 0, is_second: true },
+            Some(value) => Phase::Failed(value),
+        };
+        if rest.phase == Phase::Passed {
+            let mut variance = 0.0;
+            for ((zero, first), sums) in zeros.iter_mut().zip(&rest.first).zip(&rest.sums) {
+                let [[m1, v1], [m2, v2]] = judged(sums);
+                *zero = (f64::from(*first) + 0.5 * (m1 + m2)) as f32;
+                variance += 0.5 * (v1 + v2);
+            }
+            *noise = (variance / zeros.len() as f64).sqrt();
+        }
+    }
+
+    /// Returns the number of frames of both halves of the rest.
+    const fn halves(&self) -> [usize; 2] {
+        let first = self.params.rest_frames / 2;
+        [first, self.params.rest_frames - first]
+    }
+
+    /// Checks that nothing touches the pad: no reading is off its zero by more than noise.
+    fn is_free(&self, inputs: &Inputs<'_>, state: &State) -> Result<(), String> {
+        if state.rest.phase != Phase::Passed {
+            return Err("the frames at rest are not over".into());
+        }
+        let vectors = inputs.vectors.as_ref().ok_or("the pad sends no vector image")?;
+        let values = vectors.cells().as_flattened();
+        let off = values.iter().zip(&state.zeros).map(|(value, zero)| f64::from(value - zero).abs());
+        let (most, near) = (off.fold(0.0, f64::max), FREE * state.noise);
+        if most <= near {
+            return Ok(());
+        }
+        let unit = self.shape.unit;
+        Err(format!(
+            "something touches the pad, or its zero has drifted too far: an axis is off by {most:.1} {unit}, and {near:.1} \
+             {unit} is allowed; free the pad, or start the run again"
+        ))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use tactflow_runtime::harness::NodeRig;
+    use tactflow_runtime::random::Random;
+
+    use super::*;
+
+    fn rig(params: &str) -> Result<NodeRig, Mistakes> {
+        let shape = ImageShape { rows: 2, cols: 3, pitch: [0.005; 2], unit: Unit::RAW };
+        NodeRig::new::<CalibrateVectors>(params, &[("vectors", VectorImageShape(shape).into())])
+    }
+
+    fn show(rig: &mut NodeRig, value: impl Fn(usize) -> f64) {
+        let mut image = VectorImage::zeros(2, 3);
+        image.cells_mut().as_flattened_mut().iter_mut().enumerate().for_each(|(i, cell)| *cell = value(i) as f32);
+        rig.set("vectors", image);
+        rig.step();
+    }
+
+    #[test]
+    fn the_mean_at_rest_is_the_zero_and_the_gain_makes_forces() {
+        let mut rig = rig("gain = [0.001, -0.002, 0.003]\nrest_frames = 20").unwrap();
+        for frame in 0..20 {
+            assert!(rig.get::<VectorImage>("vectors").is_none(), "{frame}");
+            // Noise that cancels in pairs, so that the mean is exact.
+            let sign = if frame % 2 == 0 { 1.0 } else { -1.0 };
+            show(&mut rig, |i| 100.0 * i as f64 + 2.0 * sign);
+        }
+        assert_eq!(rig.get::<bool>("failed").copied(), Some(false));
+        show(&mut rig, |i| 100.0 * i as f64 + 50.0);
+        let image = rig.get::<VectorImage>("vectors").unwrap();
+        for cell in image.cells() {
+            for (force, wanted) in cell.iter().zip([0.05, -0.1, 0.15]) {
+                assert!((force - wanted).abs() < 1e-6, "{cell:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_pad_that_moves_rests_again_and_fails_the_second_time() {
+        let mut rig = rig("gain = [1.0, 1.0, 1.0]\nrest_frames = 16").unwrap();
+        let mut random = Random::new(3, 0);
+        let mut run = |rig: &mut NodeRig, drift: f64, frames: usize| {
+            for frame in 0..frames {
+                let noise: Vec<f64> = (0..18).map(|_| random.normal()).collect();
+                show(rig, |i| noise[i] + if i == 13 { drift * frame as f64 } else { 0.0 });
+            }
+        };
+        run(&mut rig, 10.0, 16);
+        assert!(rig.get::<VectorImage>("vectors").is_none() && rig.get::<bool>("failed").is_none(), "once more");
+        run(&mut rig, 0.0, 16);
+        assert!(rig.get::<VectorImage>("vectors").is_some());
+        let mut rig = self::rig("gain = [1.0, 1.0, 1.0]\nrest_frames = 16").unwrap();
+        run(&mut rig, 10.0, 32);
+        assert_eq!(rig.get::<bool>("failed").copied(), Some(true));
+        let found = rig.found().unwrap();
+        assert!(found.contains("y of row 1, column 1 changed within 16 frames"), "{found}");
+        run(&mut rig, 0.0, 20);
+        assert!(rig.get::<VectorImage>("vectors").is_none(), "a pad that failed stays absent");
+    }
+
+    #[test]
+    fn without_frames_at_rest_the_zeros_are_zero() {
+        let mut rig = rig("gain = [2.0, 2.0, 2.0]\nrest_frames = 0").unwrap();
+        show(&mut rig, |_| 3.0);
+        assert_eq!(rig.get::<VectorImage>("vectors").unwrap().cells(), [[6.0; 3]; 6]);
+    }
+
+    #[test]
+    fn wrong_numbers_are_refused() {
+        for (params, at) in
+            [("gain = [1.0, 0.0, 1.0]", "gain"), ("gain = [1.0, 1.0, 1.0]\nrest_frames = 15", "rest_frames")]
+        {
+            let mistakes = rig(params).err().unwrap();
+            assert_eq!(mistakes[0].at, tactflow_runtime::node::At::Param(at.into()), "{params}");
+        }
+    }
+}
