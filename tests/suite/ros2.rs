@@ -244,7 +244,7 @@ fn a_robot_that_hangs_and_comes_back_gets_no_old_command() {
         signal(robot.process.id(), "CONT");
         let text = end(child);
         assert!(text.contains("is lost"), "{command}: {text}");
-        sleep(Duration::from_millis(500));
+        sleep(Duration::from_secs_f64(0.5 + after));
         // The first line has the speed from before the hang.
         let later = robot.process.said(lines + 1);
         let since = later.iter().find_map(|line| line["t"].as_f64()).unwrap() + after;
