@@ -122,7 +122,28 @@ fn the_hybrid_task_holds_the_contact_over_ros_2() {
         "lwr_e1_joint"
     ]);
     let Some(robot) = Robot::start(31, json!({ "names": names })) else { return };
-    let (folder, bench) = robot.bench(&[]);
+    assert_holds(&robot, &[]);
+}
+
+/// What an arm that follows velocities has in its block.
+const VELOCITY: (&str, &str) =
+    ("command = \"/command\"", "command = \"/command\"\nmessage = \"velocity\"\nwatchdog_ms = 100.0");
+
+/// What an arm that is commanded through MoveIt Servo has in its block.
+const TWIST: (&str, &str) = (
+    "command = \"/command\"",
+    "command = \"/command\"\nmessage = \"twist\"\nwatchdog_ms = 100.0\ncommand_in_type = \"speed_units\"\nframe = \"base\"",
+);
+
+#[test]
+fn the_hybrid_task_holds_the_contact_through_twists_of_servo() {
+    let Some(robot) = Robot::start(72, json!({ "command": "twist" })) else { return };
+    assert_holds(&robot, &[TWIST]);
+}
+
+/// Runs the hybrid task: the contact is held, and the commands are young. It says how old they are.
+fn assert_holds(robot: &Robot, change: &[(&str, &str)]) {
+    let (folder, bench) = robot.bench(change);
     let out = folder.path().join("run.csv");
     let recording = folder.path().join("run.mcap");
     let [out, recording] = [&out, &recording].map(|path| path.to_str().unwrap());
@@ -165,17 +186,21 @@ fn arrays_and_tactile_states_are_pads_too() {
 }
 
 #[test]
-fn velocities_move_an_arm_that_has_a_watchdog() {
-    let Some(robot) = Robot::start(34, json!({ "command": "velocity" })) else { return };
-    let change = ("command = \"/command\"", "command = \"/command\"\nmessage = \"velocity\"\nwatchdog_ms = 100.0");
-    let (_folder, bench) = robot.bench(&[change]);
-    let mut child = run(&bench);
-    robot.moves();
-    signal(child.id(), "KILL");
-    let killed = robot.now();
-    let _ = child.wait();
-    sleep(Duration::from_secs(1));
-    assert!(robot.speed(killed + 0.1 + REST) < STILL, "{} rad/s", robot.speed(killed + 0.1 + REST));
+fn velocities_and_twists_move_an_arm_that_has_a_watchdog() {
+    for (domain, command, change) in [(34, "velocity", VELOCITY), (73, "twist", TWIST)] {
+        let Some(robot) = Robot::start(domain, json!({ "command": command })) else { return };
+        let (_folder, bench) = robot.bench(&[change]);
+        for name in ["INT", "KILL"] {
+            let mut child = run(&bench);
+            robot.moves();
+            signal(child.id(), name);
+            let killed = robot.now();
+            let _ = child.wait();
+            sleep(Duration::from_secs(1));
+            let speed = robot.speed(killed + 0.1 + REST);
+            assert!(speed < STILL, "{command} {name}: {speed} rad/s");
+        }
+    }
 }
 
 #[test]
@@ -205,27 +230,36 @@ fn whatever_happens_to_the_process_the_arm_comes_to_rest() {
 
 #[test]
 fn a_robot_that_hangs_and_comes_back_gets_no_old_command() {
-    let Some(robot) = Robot::start(36, json!({})) else { return };
-    let (_folder, bench) = robot.bench(&[]);
-    let child = run(&bench);
-    robot.moves();
-    signal(robot.process.id(), "STOP");
-    sleep(Duration::from_millis(1500));
-    let lines = robot.process.count();
-    signal(robot.process.id(), "CONT");
-    let text = end(child);
-    assert!(text.contains("is lost"), "{text}");
-    sleep(Duration::from_millis(500));
-    // The first line has the speed from before the hang.
-    let later = robot.process.said(lines + 1);
-    let fastest = later.iter().filter_map(|line| line["speed"].as_f64()).fold(0.0, f64::max);
-    assert!(later.len() > 10 && fastest < STILL, "{fastest} rad/s after it came back");
+    // Velocities have no times: old ones are obeyed, but no longer than the watchdog says.
+    let cases =
+        [(36, "trajectory", None, 0.0), (75, "twist", Some(TWIST), 0.0), (76, "velocity", Some(VELOCITY), 0.1 + REST)];
+    for (domain, command, change, after) in cases {
+        let Some(robot) = Robot::start(domain, json!({ "command": command })) else { return };
+        let (_folder, bench) = robot.bench(change.as_slice());
+        let child = run(&bench);
+        robot.moves();
+        signal(robot.process.id(), "STOP");
+        sleep(Duration::from_millis(1500));
+        let lines = robot.process.count();
+        signal(robot.process.id(), "CONT");
+        let text = end(child);
+        assert!(text.contains("is lost"), "{command}: {text}");
+        sleep(Duration::from_secs_f64(0.5 + after));
+        // The first line has the speed from before the hang.
+        let later = robot.process.said(lines + 1);
+        let since = later.iter().find_map(|line| line["t"].as_f64()).unwrap() + after;
+        let later = later.iter().filter(|line| line["t"].as_f64().is_some_and(|t| t >= since));
+        let speeds: Vec<f64> = later.filter_map(|line| line["speed"].as_f64()).collect();
+        let fastest = speeds.iter().copied().fold(0.0, f64::max);
+        assert!(speeds.len() > 10 && fastest < STILL, "{command}: {fastest} rad/s after it came back");
+    }
 }
 
 /// What is wrong, and what the run says.
 fn assert_says(domain: u32, settings: Value, word: Option<&str>, expected: &str) {
     let Some(mut robot) = Robot::start(domain, settings.clone()) else { return };
-    let (_folder, bench) = robot.bench(&[]);
+    let change = [TWIST];
+    let (_folder, bench) = robot.bench(if settings["command"] == "twist" { &change } else { &[] });
     let child = run(&bench);
     if let Some(word) = word {
         robot.moves();
@@ -258,6 +292,11 @@ fn what_is_wrong_on_the_topics_is_named() {
         (json!({ "stamp_offset": -1.7e9 }), "are years away from the clock of this machine"),
         (json!({ "stamp_offset": -0.5 }), "behind the clock of this machine, and at most 20 ms"),
         (json!({ "stamp_offset": 0.5 }), "ahead of the clock of this machine, and at most 20 ms"),
+        (json!({ "command": "twist", "stamp_offset": -0.5 }), "behind the clock of this machine, and at most 20 ms"),
+        (
+            json!({ "command": "twist", "reader_type": "String" }),
+            "`/command` is read as std_msgs/msg/String, and not as",
+        ),
         (json!({ "command": null }), "nobody reads `/command` in the domain "),
         (
             json!({ "reader_type": "Float64MultiArray" }),
@@ -284,6 +323,7 @@ fn what_goes_wrong_while_the_arm_moves_stops_it() {
     for (i, (word, expected)) in cases.into_iter().enumerate() {
         assert_says(60 + i as u32, json!({}), Some(word), expected);
     }
+    assert_says(74, json!({ "command": "twist" }), Some("stray"), "joint `lwr_a6_joint` moves at ");
 }
 
 /// A task that reads a force sensor alone, with a part of the bench.
@@ -384,6 +424,19 @@ fn a_bench_that_cannot_be_right_is_refused_without_a_domain() {
             "write `watchdog_ms`, the time after",
         ),
         ("command = \"/command\"", "command = \"/command\"\nwatchdog_ms = 5", "needs no watchdog"),
+        (TWIST.0, &*TWIST.1.replace("speed_units", "unitless"), "set `command_in_type: speed_units` in the parameters"),
+        (
+            TWIST.0,
+            &*TWIST.1.replace("command_in_type = \"speed_units\"\n", ""),
+            "takes twists without units, unless its",
+        ),
+        (
+            TWIST.0,
+            &*TWIST.1.replace("watchdog_ms = 100.0\n", ""),
+            "with the value of Servo's `incoming_command_timeout`",
+        ),
+        (TWIST.0, &*TWIST.1.replace("frame = \"base\"", ""), "write the planning frame of MoveIt Servo"),
+        ("command = \"/command\"", "command = \"/command\"\nframe = \"base\"", "`frame` is for twists"),
         (
             "command = \"/command\"",
             "command = \"/command\"\njoints = [\"a\"]",

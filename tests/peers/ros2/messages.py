@@ -112,6 +112,18 @@ class WrenchStamped(IdlStruct, typename=_type("geometry_msgs", "WrenchStamped"))
 
 
 @dataclass
+class Twist(IdlStruct, typename=_type("geometry_msgs", "Twist")):
+    linear: Vector3 = field(default_factory=Vector3)
+    angular: Vector3 = field(default_factory=Vector3)
+
+
+@dataclass
+class TwistStamped(IdlStruct, typename=_type("geometry_msgs", "TwistStamped")):
+    header: Header = field(default_factory=Header)
+    twist: Twist = field(default_factory=Twist)
+
+
+@dataclass
 class JointTrajectoryPoint(IdlStruct, typename=_type("trajectory_msgs", "JointTrajectoryPoint")):
     positions: sequence[float64] = field(default_factory=list)
     velocities: sequence[float64] = field(default_factory=list)

@@ -3,14 +3,16 @@
     python3 robot.py '{"domain": 7, "urdf": "graphs/robots/lwr4p.urdf"}'
 
 The arm is stiff and follows its controller with a lag. The controller is that of `joint_trajectory_controller`, or
-one that follows velocities and stops after 100 ms without one. A trajectory starts at its stamp. One that has ended
+one that follows velocities and stops after 100 ms without one, or MoveIt Servo: it takes twists of the tip in the axes of
+`base` [m/s, rad/s], makes joint velocities of them with the pseudoinverse, and stops when the stamp of the last twist is
+100 ms old. A trajectory starts at its stamp. One that has ended
 before it arrives is refused. The pad is an elastic foundation: each tactel is a spring that a ball at a fixed place
 in the base presses. Friction, the weight of the arm and the flexibility of its joints are left out.
 
 It prints a line of JSON every 20 ms: its wall clock, joints, their largest speed since the last line, the force, how
 many commands it has taken and refused, and how old those since the last line were when they came. It reads words:
 `quiet` and `talk` (the joint states), `blind` and `see` (the image), `second` (another publisher of commands), `twin`
-(another publisher of joints), `nan` (the position of a joint).
+(another publisher XX
 """
 
 import json
@@ -72,6 +74,11 @@ def rotation(rpy):
     ])
 
 
+def about(axis, angle):
+    cross = np.array([[0, -axis[2], axis[1]], [axis[2], 0, -axis[0]], [-axis[1], axis[0], 0]])
+    return np.eye(3) + np.sin(angle) * cross + (1 - np.cos(angle)) * cross @ cross
+
+
 class Arm:
     """The kinematics of a chain of revolute joints, read from a URDF."""
 
@@ -85,13 +92,20 @@ class Arm:
                 turn = rotation(numbers(origin.get("rpy")))
                 self.joints.append((numbers(origin.get("xyz")), turn, numbers(joint.find("axis").get("xyz"))))
 
+    def jacobian(self, q):
+        """Returns the velocity of the origin of the tip, and its angular velocity, for each joint."""
+        place, axes, columns = np.zeros(3), np.eye(3), []
+        for angle, (xyz, turn, axis) in zip(q, self.joints):
+            place, axes = place + axes @ xyz, axes @ turn
+            columns.append((place, axes @ axis))
+            axes = axes @ about(axis, angle)
+        return np.array([[*np.cross(axis, place - origin), *axis] for origin, axis in columns]).T
+
     def pose(self, q):
         """Returns the place [m] and the axes of the pad."""
         place, axes = np.zeros(3), np.eye(3)
         for angle, (xyz, turn, axis) in zip(q, self.joints):
-            place = place + axes @ xyz
-            cross = np.array([[0, -axis[2], axis[1]], [axis[2], 0, -axis[0]], [-axis[1], axis[0], 0]])
-            axes = axes @ turn @ (np.eye(3) + np.sin(angle) * cross + (1 - np.cos(angle)) * cross @ cross)
+            place, axes = place + axes @ xyz, axes @ turn @ about(axis, angle)
         return place + axes @ [0, 0, MOUNT], axes
 
 
@@ -101,6 +115,7 @@ class Controller:
     def __init__(self, q):
         self.q, self.plan, self.velocity, self.fed = np.array(q), None, np.zeros(len(q)), -1.0
         self.taken, self.refused, self.ages = 0, 0, []
+        self.strays = False
 
     def trajectory(self, message, now, names):
         """Takes a trajectory as `joint_trajectory_controller` does."""
@@ -122,6 +137,20 @@ class Controller:
     def velocities(self, message, now):
         self.taken += 1
         self.velocity, self.fed = np.array(message.data), now
+
+    def twist(self, message, now, jacobian):
+        """Takes a twist as MoveIt Servo does."""
+        begin = message.header.stamp.seconds()
+        self.ages.append(now - begin)
+        if message.header.frame_id != "base" or now - begin >= 0.1:
+            self.refused += 1
+            return
+        linear, angular = message.twist.linear, message.twist.angular
+        twist = np.array([linear.x, linear.y, linear.z, angular.x, angular.y, angular.z])
+        self.taken += 1
+        self.velocity, self.fed = np.linalg.pinv(jacobian) @ twist, begin
+        if self.strays and np.any(twist != 0.0):
+            self.velocity[-1] += 8.0
 
     def step(self, now, dt):
         """Returns the commanded posture."""
@@ -166,7 +195,7 @@ class Robot:
             self.pad = self.writer("/tactile", pads[SETTINGS["pad"]], best_effort)
         self.wrench_type = getattr(ros, SETTINGS["wrench_type"])
         self.wrench = self.writer("/wrench", self.wrench_type, best_effort)
-        kinds = {"trajectory": "JointTrajectory", "velocity": "Float64MultiArray"}
+        kinds = {"trajectory": "JointTrajectory", "velocity": "Float64MultiArray", "twist": "TwistStamped"}
         self.commands, self.rival = None, None
         self.command_kind = getattr(ros, SETTINGS["reader_type"] or kinds.get(SETTINGS["command"], "String"))
         if SETTINGS["reader_durability"] == "transient_local":
@@ -204,6 +233,8 @@ class Robot:
                     self.controller.trajectory(message, now, self.arm.names)
                 elif self.command_kind is ros.Float64MultiArray:
                     self.controller.velocities(message, now)
+                elif self.command_kind is ros.TwistStamped:
+                    self.controller.twist(message, now, self.arm.jacobian(self.q))
         last = self.q
         self.q = last + (self.controller.step(now, dt) - last) * min(dt / LAG, 1.0)
         self.fastest = max(self.fastest, float(np.abs(self.q - last).max() / dt))
@@ -250,6 +281,8 @@ class Robot:
             self.rival = DataWriter(self.participant, self.command_topic, qos=Qos(RELIABLE))
         elif word == "twin":
             self.twin = self.writer("/joint_states", ros.JointState, Qos(Policy.Reliability.BestEffort))
+        elif word == "stray":
+            self.controller.strays = True
         elif word in ("quiet", "talk"):
             self.talks = word == "talk"
         elif word == "nan":

@@ -4,12 +4,14 @@ use std::time::Duration;
 
 use tactflow_runtime::device::{Description, Device, Driver, OnSilence, Opened};
 use tactflow_runtime::node::{At, Describe, FilePath, Mistake, Mistakes, Param};
-use tactflow_runtime::signal::JointsShape;
+use tactflow_runtime::signal::{Joint, JointsShape};
 use tactflow_runtime::source::Code;
 
+use super::beyond::Beyond;
 use super::driver::ArmDriver;
-use super::output::Commanded;
+use super::output::{Commanded, Form};
 use super::place::{Place, check_topic};
+use crate::arm::chain::Chain;
 use crate::arm::model::load;
 use crate::arm::mount::Mount;
 use crate::devices::arm::{self, ArmPorts};
@@ -18,6 +20,8 @@ use crate::usual::USUAL_RAD;
 
 /// Time that a controller needs to take a message and to act on it, at most [s].
 const REACTION_S: f64 = 0.02;
+/// The same for MoveIt Servo, which publishes every 34 ms by default, and smooths what it publishes [s].
+const SERVO_REACTION_S: f64 = 0.15;
 
 /// The type of the commands.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Param)]
@@ -27,6 +31,18 @@ enum Kind {
     /// `std_msgs/msg/Float64MultiArray`: velocities [rad/s] in the order of `joints`. Something on the robot must stop it
     /// when no message comes: see `watchdog_ms`.
     Velocity,
+    /// `geometry_msgs/msg/TwistStamped` for MoveIt Servo: the velocity of the origin of the tip [m/s] and its angular
+    /// velocity [rad/s], in the axes of `frame`. See `command_in_type` and `watchdog_ms`.
+    Twist,
+}
+
+/// What MoveIt Servo takes the numbers of a twist for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Param)]
+enum CommandIn {
+    /// Fractions of a speed that Servo knows alone. It is the default of Servo, and is refused.
+    Unitless,
+    /// m/s and rad/s.
+    SpeedUnits,
 }
 
 /// Parameters of `ros2_arm`.
@@ -75,10 +91,14 @@ pub struct Params {
     /// states when it was made, so that one that arrives late does not move the arm.
     #[param(unit = "ms", above = 0.0, default = 20.0)]
     clock_bound_ms: f64,
-    /// Time without a command after which the robot stops by itself. Velocities need it: state here what the controller
-    /// on the robot does.
+    /// Time without a command after which the robot stops by itself. Velocities and twists need it: state here what the
+    /// controller on the robot does. For MoveIt Servo, it is its parameter `incoming_command_timeout`.
     #[param(unit = "ms", range = 1.0..=1000.0)]
     watchdog_ms: Option<f64>,
+    /// Of twists: the parameter `command_in_type` of MoveIt Servo, which must be `speed_units`.
+    command_in_type: Option<CommandIn>,
+    /// Of twists: the name of the base of the model on the robot. It must be the planning frame of MoveIt Servo.
+    frame: Option<String>,
 }
 
 /// How far the joints may be from where they should be.
@@ -100,6 +120,11 @@ struct PostureBounds {
 /// The commands are trajectories that always end at rest: without another one, the arm is at rest after `horizon_ms` and
 /// the time to slow down, whatever happens to this process, its machine or the network. While the arm is to rest, nothing
 /// is sent. With `message = "velocity"`, velocities are sent, and only `watchdog_ms` on the robot stops it.
+///
+/// With `message = "twist"`, MoveIt Servo gets the twist of the tip that the joint velocities amount to, and computes joint
+/// velocities of its own. The commands have crossed all limits, but those of single joints hold for what Servo makes of
+/// them only as far as it keeps to them. So a joint that is measured outside of its range, or above 1.2 times its greatest
+/// speed, stops the arm. Twists have absolute times, as trajectories have.
 ///
 /// The arm is moved only if all of this holds, and the message says what does not: all joints are stated, by one publisher;
 /// somebody reads the commands as the type that is sent; nobody else publishes on their topic; and the clocks agree. When
@@ -140,7 +165,7 @@ impl Device for Ros2Arm {
         params.home.as_ref().map_or(Ok(()), |home| arm::check_posture("home", home, chain.joints()))?;
         let joints = arm::live_joints(&chain, params.acceleration, params.start.as_deref())?;
         let names = names(&params, &joints)?;
-        let commanded = commanded(&params, &joints)?;
+        let commanded = commanded(&params, &joints, &chain)?;
         let mut description = Description::every(1.0 / params.rate_hz);
         let facts = arm::facts(&params.urdf, &params.tip, params.home.as_deref())?;
         let ports = ArmPorts::fill(description.fills(arm::ROLE), &joints, facts);
@@ -149,7 +174,11 @@ impl Device for Ros2Arm {
         let PostureBounds { deflection, posture } = params.start_bounds;
         // Nobody states a pose of the tip.
         let bounds = StartBounds { deflection, posture, ..StartBounds::default() };
+        let limits =
+            chain.joints().iter().zip(&names).map(|(joint, name)| Joint { name: name.clone(), ..joint.clone() });
+        let beyond = commanded.is_of_tip().then(|| Beyond::new(limits.collect()));
         let driver = ArmDriver {
+            beyond,
             ports,
             site: params.place.site()?,
             states: params.states,
@@ -182,29 +211,62 @@ fn names(params: &Params, joints: &JointsShape) -> Result<Vec<String>, Mistakes>
 }
 
 /// Returns how the arm is commanded, and when it rests without a command.
-fn commanded(params: &Params, joints: &JointsShape) -> Result<Commanded, Mistakes> {
-    let fastest = joints.joints.iter().map(|joint| joint.speed).fold(0.0, f64::max);
-    let stop = fastest / params.acceleration + REACTION_S;
+fn commanded(params: &Params, joints: &JointsShape, chain: &Chain) -> Result<Commanded, Mistakes> {
+    if params.message != Kind::Twist {
+        let is_given = [("command_in_type", params.command_in_type.is_some()), ("frame", params.frame.is_some())];
+        if let Some((name, _)) = is_given.into_iter().find(|(_, is_given)| *is_given) {
+            let message = format!("`{name}` is for twists");
+            let help = format!("remove `{name}`, or write `message = \"twist\"`");
+            return Err(Mistake::key(name, message).help(help).into());
+        }
+    }
     let horizon = params.horizon_ms * 1e-3;
-    let clock_bound = (params.clock_bound_ms * 1e6) as i64;
-    let whole_ms = |seconds: f64| (seconds * 1e3).ceil() * 1e-3;
-    match (params.message, params.watchdog_ms) {
-        (Kind::Trajectory, None) => {
-            Ok(Commanded { horizon: Some(horizon), lifespan: horizon, clock_bound, silence: whole_ms(horizon + stop) })
-        }
-        (Kind::Velocity, Some(watchdog_ms)) => {
-            let watchdog = watchdog_ms * 1e-3;
-            Ok(Commanded { horizon: None, lifespan: watchdog, clock_bound, silence: whole_ms(watchdog + stop) })
-        }
+    let (form, lifespan, reaction) = match (params.message, params.watchdog_ms) {
+        (Kind::Trajectory, None) => (Form::Trajectory { horizon }, horizon, REACTION_S),
+        (Kind::Velocity, Some(watchdog_ms)) => (Form::Velocity, watchdog_ms * 1e-3, REACTION_S),
+        (Kind::Twist, Some(watchdog_ms)) => (of_servo(params, chain)?, watchdog_ms * 1e-3, SERVO_REACTION_S),
         (Kind::Trajectory, Some(_)) => {
             let message = "a trajectory ends at rest by itself, so it needs no watchdog";
-            Err(Mistake::key("watchdog_ms", message).help("remove `watchdog_ms`").into())
+            return Err(Mistake::key("watchdog_ms", message).help("remove `watchdog_ms`").into());
         }
         (Kind::Velocity, None) => {
             let message = "nothing stops an arm that follows velocities when no message comes";
             let help = "write `watchdog_ms`, the time after which the controller on the robot stops by itself, or \
                         `message = \"trajectory\"`";
-            Err(Mistake::new(Code::MissingKey, At::Node, message).help(help).into())
+            return Err(Mistake::new(Code::MissingKey, At::Node, message).help(help).into());
+        }
+        (Kind::Twist, None) => {
+            let message = "it is not stated when MoveIt Servo stops an arm for which no message comes";
+            let help = "write `watchdog_ms`, with the value of Servo's `incoming_command_timeout`: `watchdog_ms = 100` for \
+                        its default of 0.1 s";
+            return Err(Mistake::new(Code::MissingKey, At::Node, message).help(help).into());
+        }
+    };
+    let fastest = joints.joints.iter().map(|joint| joint.speed).fold(0.0, f64::max);
+    let silence = ((lifespan + fastest / params.acceleration + reaction) * 1e3).ceil() * 1e-3;
+    Ok(Commanded { form, lifespan, clock_bound: (params.clock_bound_ms * 1e6) as i64, silence })
+}
+
+/// Returns what MoveIt Servo is sent, if it takes m/s and rad/s.
+fn of_servo(params: &Params, chain: &Chain) -> Result<Form, Mistakes> {
+    const UNITS: &str = "set `command_in_type: speed_units` in the parameters of Servo, and write \
+                         `command_in_type = \"speed_units\"` here";
+    match params.command_in_type {
+        Some(CommandIn::SpeedUnits) => {}
+        Some(CommandIn::Unitless) => {
+            let message = "with `unitless`, MoveIt Servo multiplies a twist in m/s by its own `scale`";
+            return Err(Mistake::param("command_in_type", message).help(UNITS).into());
+        }
+        None => {
+            let message =
+                "MoveIt Servo takes twists without units, unless its parameter `command_in_type` says otherwise";
+            return Err(Mistake::new(Code::MissingKey, At::Node, message).help(UNITS).into());
         }
     }
+    let Some(frame) = params.frame.clone().filter(|frame| !frame.is_empty()) else {
+        let message = "twists need `frame`, the name of the base of the model on the robot";
+        let help = "write the planning frame of MoveIt Servo, such as `frame = \"base_link\"`";
+        return Err(Mistake::new(Code::MissingKey, At::Node, message).help(help).into());
+    };
+    Ok(Form::Twist { chain: Box::new(chain.clone()), frame })
 }

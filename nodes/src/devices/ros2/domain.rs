@@ -266,22 +266,8 @@ fn refused(name: &str, error: &dyn std::fmt::Debug) -> String {
 mod tests {
     use std::net::Ipv4Addr;
 
-    use serde::{Deserialize, Serialize};
-
-    use super::super::message::{Header, WrenchStamped};
+    use super::super::message::{TwistStamped, WrenchStamped};
     use super::*;
-
-    /// `geometry_msgs/msg/TwistStamped`, whose bytes are those of a wrench.
-    #[derive(Default, Serialize, Deserialize)]
-    struct TwistStamped {
-        header: Header,
-        linear: [f64; 3],
-        angular: [f64; 3],
-    }
-
-    impl Message for TwistStamped {
-        const TYPE: &'static str = "geometry_msgs/msg/TwistStamped";
-    }
 
     /// Returns what a reader of wrenches gets from a writer of another participant.
     async fn received<M: Message + Default>(topic: &str) -> Result<(), String> {

@@ -7,11 +7,12 @@ use rustdds::GUID;
 use tactflow_runtime::device::{DeviceError, Link, Live};
 use tokio::time::{sleep, sleep_until};
 
+use super::beyond::Beyond;
 use super::clock::Agreement;
 use super::course::Course;
 use super::domain::Domain;
 use super::message::JointState;
-use super::output::{Commanded, Output, wall_clock};
+use super::output::{Commanded, Output, Said, wall_clock};
 use super::place::Site;
 use crate::devices::arm::ArmPorts;
 use crate::devices::start::{StartCheck, StartReport};
@@ -30,6 +31,8 @@ pub(super) struct ArmDriver {
     pub(super) states: String,
     pub(super) command: String,
     pub(super) names: Vec<String>,
+    /// The limits of the joints, where another program computes their velocities.
+    pub(super) beyond: Option<Beyond>,
     pub(super) start: StartCheck,
     /// Maximum difference between the measured and the commanded position of a joint [rad].
     pub(super) deflection: f64,
@@ -187,6 +190,9 @@ impl Session {
         if self.course.rests() && self.stops_until.is_none() && !self.is_ready() {
             self.course.reference.copy_from_slice(&self.position);
         }
+        if let Some(beyond) = &mut self.arm.beyond {
+            beyond.hear(now, &self.position);
+        }
         self.heard = Some((now, writer));
         (self.is_lost, self.bad, self.number) = (false, None, self.number + 1);
         let is_ready = self.is_ready();
@@ -195,7 +201,7 @@ impl Session {
             return;
         }
         let stamp = if stamp == 0 { link.arrival() } else { link.stamp_of(stamp) };
-        let equilibrium = if self.output.ends_at_rest() { &self.course.reference } else { &self.position };
+        let equilibrium = if self.arm.commanded.ends_at_rest() { &self.course.reference } else { &self.position };
         let (ports, number) = (self.arm.ports, self.number);
         link.publish(|samples| {
             ports.write_with_safety(samples, stamp, number, [&self.position, equilibrium], is_ready);
@@ -222,12 +228,11 @@ impl Session {
         if self.second.is_some_and(|second| at.saturating_duration_since(second) < MEMORY) {
             return Some(format!("two programs publish our joints on `{states}`"));
         }
-        if self.output.ends_at_rest()
-            && let Some(why) = self.agreement.why_not(states).or_else(|| self.why_astray())
-        {
-            return Some(why);
-        }
-        self.topics.clone()
+        let commanded = &self.arm.commanded;
+        let clocks = || commanded.has_time().then(|| self.agreement.why_not(states)).flatten();
+        let astray = || commanded.ends_at_rest().then(|| self.why_astray()).flatten();
+        let beyond = || self.arm.beyond.as_ref().and_then(Beyond::why);
+        clocks().or_else(astray).or_else(beyond).or_else(|| self.topics.clone())
     }
 
     /// Says which joint does not follow: a controller that is not active takes messages, and moves nothing.
@@ -312,9 +317,9 @@ impl Session {
         let rests = self.course.rests();
         self.is_first &= rests;
         // At rest, an arm that follows trajectories needs no message. One that follows velocities gets zeros.
-        let is_due = !(rests && self.has_ended) || is_checked && !self.output.ends_at_rest();
+        let is_due = !(rests && self.has_ended) || is_checked && !self.arm.commanded.ends_at_rest();
         if is_due {
-            let is_sent = self.output.say(&self.course, &self.arm.names, made);
+            let is_sent = self.say(made);
             self.has_ended = rests && is_sent;
             if !is_sent {
                 link.count("commands that were not sent");
@@ -322,12 +327,18 @@ impl Session {
         }
     }
 
+    /// Sends the course, as it was made at a time [ns, wall clock]. Returns whether it was taken.
+    fn say(&self, made: i64) -> bool {
+        let (names, position) = (&self.arm.names, &self.position);
+        self.output.say(&Said { course: &self.course, names, position, made })
+    }
+
     /// Repeats at the end of a run that an arm that follows velocities is to rest, in case a message was lost.
     ///
     /// A trajectory ends at rest by itself. Another one would move an arm that has stopped on its own, as while this process
     /// was suspended, back to where it was last commanded.
     async fn leave(&mut self, link: &Link) {
-        if self.output.ends_at_rest() {
+        if self.arm.commanded.ends_at_rest() {
             return;
         }
         self.course.halt();
@@ -335,7 +346,7 @@ impl Session {
             if link.is_mute() || self.is_first {
                 return;
             }
-            self.output.say(&self.course, &self.arm.names, wall_clock());
+            self.say(wall_clock());
             sleep(Duration::from_millis(10)).await;
         }
     }

@@ -148,6 +148,18 @@ impl Message for WrenchStamped {
     const TYPE: &'static str = "geometry_msgs/msg/WrenchStamped";
 }
 
+/// `geometry_msgs/msg/TwistStamped`: a linear velocity [m/s], and an angular velocity [rad/s].
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+pub(super) struct TwistStamped {
+    pub(super) header: Header,
+    pub(super) linear: [f64; 3],
+    pub(super) angular: [f64; 3],
+}
+
+impl Message for TwistStamped {
+    const TYPE: &'static str = "geometry_msgs/msg/TwistStamped";
+}
+
 /// `trajectory_msgs/msg/JointTrajectory`.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub(super) struct JointTrajectory {

@@ -6,6 +6,7 @@
 //! them. Only `domain` does I/O.
 
 mod arm;
+mod beyond;
 mod clock;
 mod course;
 mod domain;
