@@ -92,6 +92,29 @@ fn the_task_holds_the_box_and_presses_no_harder_than_friction_needs() {
 }
 
 #[test]
+fn vectors_that_are_wrong_do_not_press_harder() {
+    // The largest true force until the end, and whether it was a failure.
+    let most = |set: &str| {
+        let (mut engine, mut most) = (engine(&hold().set(set)), 0.0_f64);
+        while let Some(next) = engine.next().filter(|next| (*next as f64) < 13.5e9) {
+            if engine.tick(next).is_err() {
+                return (most, true);
+            }
+            most = most.max(number(&engine, "truth.force"));
+        }
+        (most, false)
+    };
+    let (healthy, has_failed) = most("nodes.grip.keep_margin=0.4");
+    assert!(healthy > 5.0 && healthy < 8.0 && !has_failed, "{healthy} N");
+    // z that is dead, z with the wrong sign, x and y that are dead.
+    for (gain, fails) in [("[1e-3, 1e-3, 1e-9]", false), ("[1e-3, 1e-3, -1e-3]", true), ("[1e-9, 1e-9, 1e-3]", false)] {
+        let (force, has_failed) = most(&format!("nodes.forces.gain={gain}"));
+        assert!(force < 1.3 * healthy, "{gain}: {force} N, and {healthy} N with sound vectors");
+        assert_eq!(has_failed, fails, "{gain}");
+    }
+}
+
+#[test]
 fn a_vector_that_is_not_finite_is_a_fault_of_the_pad() {
     let shape = ImageShape { rows: 2, cols: 2, pitch: [0.005; 2], unit: Unit::NEWTON };
     let pad = FedRole::new("pad", "three_axis_pad", 4.0);
@@ -125,7 +148,7 @@ fn vector_images_are_recorded_exported_compared_and_shown() {
     let graph = graph.to_str().unwrap();
     let [one, other, archive] = [path("one.mcap"), path("other.mcap"), path("one.npz")];
     let said = say(&["run", graph, "--for", "1s", "--record", &one]);
-    assert!(said.code == 0 && said.out.contains("arrows: the drag of the object"), "{}{}", said.out, said.err);
+    assert!(said.code == 0 && said.out.contains("arrows: x and y of the tactels"), "{}{}", said.out, said.err);
     say(&["run", graph, "--for", "1s", "--set", "devices.bench.seed=2", "--record", &other]);
     let said = say(&["replay", &one]);
     assert!(said.code == 0 && said.out.contains("the same to the last bit"), "{}{}", said.out, said.err);

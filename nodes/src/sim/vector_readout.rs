@@ -62,7 +62,7 @@ impl VectorReadout {
         Self { tactels, own_noise, noise: Random::new(seed, 6) }
     }
 
-    /// Reads a frame of these forces into `counts`. The drag of forces without one is 0.
+    /// Reads a frame of these forces into `counts`. Forces of a pad with one axis have x = y = 0.
     pub fn read(&mut self, forces: &Forces, counts: &mut [[f32; 3]]) {
         for (i, (tactel, counts)) in self.tactels.iter().zip(counts).enumerate() {
             let [x, y] = forces.drag.as_ref().map_or([0.0; 2], |[x, y]| [x[i], y[i]]);

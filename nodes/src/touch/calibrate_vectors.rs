@@ -1,7 +1,8 @@
 //! `calibrate_vectors`: from the readings of a pad with three axes to forces.
 //!
-//! The frames at rest are two halves. With the means m1, m2 and the variances v1, v2 of an axis of a tactel over h frames
-//! each, the zero is (m1 + m2) / 2. The axis is steady if |m2 - m1| is at most 6 sqrt((v1 + v2) / h).
+//! The frames at rest are two halves of h1 and h2 frames. Let m1 and m2 be the means of a value in the halves, and v the
+//! median of the variances of all values of its axis. The zero is (m1 + m2) / 2. The value is steady if |m2 - m1| is at most
+//! 6 sqrt(v / h1 + v / h2).
 
 use tactflow_runtime::node::{
     Describe, In, Inputs, Limits, Mistake, Mistakes, Node, Out, Outputs, Param, Setup, State, Tick, refuse_any,
@@ -11,12 +12,16 @@ use tactflow_runtime::signal::{Flag, ImageShape, Unit, VectorImage, VectorImageS
 /// Converts the readings of a pad with three axes to forces [N]: `force = gain (value - zero)`, along x, y and z.
 ///
 /// **At rest.** The first `rest_frames` frames show the zero of each axis of each tactel, while nothing may touch the pad.
-/// Until they are over, the output is absent. If an axis is not steady meanwhile, the frames are repeated once; the second
-/// failure ends the task, and the fault names the tactel. A touch that does not change at all cannot be seen: wire the
-/// image of the pad to `calibrate`, whose self-test compares the zeros with those of the calibration.
+/// Until they are over, the output is absent. The frames are repeated once if a value is not steady, or if more than one in
+/// fifty values of an axis never change while others do: such an axis is dead, and would hide a force. The second failure
+/// ends the task, and the fault names the tactel. With `may_repeat`, values that never change are accepted.
+///
+/// A touch that does not change cannot be seen: wire the image of the pad to `calibrate`, whose self-test compares the zeros
+/// with those of the calibration.
 ///
 /// The operator takes the zeros anew with the word `tare`, while the task is halted. It is refused while a reading is off
-/// its zero by more than eight times the noise. A pad that was lost and comes back rests again.
+/// its zero by more than eight times the noise. The zeros outlast an absence, and a pad that was lost and comes back: it
+/// may be in contact.
 ///
 /// ```toml
 /// [nodes.calibrate_vectors]
@@ -40,6 +45,9 @@ pub struct Params {
     /// Number of frames at rest, at least 16; 0 if the zeros are 0.
     #[param(range = 0..=1_000_000, default = 40)]
     rest_frames: usize,
+    /// Whether sound values may never change at rest, as in a pad without noise.
+    #[param(default = false)]
+    may_repeat: bool,
 }
 
 /// What `calibrate_vectors` reads.
@@ -79,8 +87,16 @@ enum Phase {
     },
     #[default]
     Passed,
-    /// An axis of a tactel, by its index among all axes, is not steady.
-    Failed(usize),
+    Failed(Flaw),
+}
+
+/// Why a pad does not rest: a value, by its index among the values of all tactels.
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Flaw {
+    /// It is not steady.
+    Unsteady(usize),
+    /// It never changes, and so do too many of its axis.
+    Dead(usize),
 }
 
 /// The frames at rest.
@@ -91,13 +107,17 @@ struct Rest {
     first: Vec<f32>,
     /// For each axis and each half: the sum and the sum of squares, of the difference from the first reading.
     sums: Vec<[[f64; 2]; 2]>,
+    /// Variances of one axis, for their median.
+    sorted: Vec<f64>,
 }
 
-/// Number of standard deviations of the difference of two means that are no chance.
+/// Greatest difference of the two means of a steady value [standard deviations of the difference].
 const SIGNIFICANT: f64 = 6.0;
-/// A reading that is off its zero by that many times the noise is no noise.
+/// Greatest reading of a pad that nothing touches [standard deviations of the noise].
 const FREE: f64 = 8.0;
-/// Smallest number of frames at rest, if there are any: with fewer, a steady drift hides behind its own variance.
+/// One in so many values of an axis may be dead.
+const DEAD_FRACTION: usize = 50;
+/// Smallest number of frames at rest, if there are any.
 const MIN_FRAMES: usize = 16;
 
 impl Node for CalibrateVectors {
@@ -128,31 +148,18 @@ impl Node for CalibrateVectors {
     fn state(&self) -> State {
         let values = 3 * self.shape.tactels();
         let phase = if self.params.rest_frames == 0 { Phase::Passed } else { Phase::FIRST };
-        let rest = Rest { phase, first: vec![0.0; values], sums: vec![[[0.0; 2]; 2]; values] };
+        let sorted = Vec::with_capacity(self.shape.tactels());
+        let rest = Rest { phase, first: vec![0.0; values], sums: vec![[[0.0; 2]; 2]; values], sorted };
         State { rest, zeros: vec![0.0; values], noise: 0.0 }
     }
 
     fn found(&self, state: &State) -> Option<String> {
         match state.rest.phase {
-            Phase::Failed(value) => {
-                let (tactel, axis) = (value / 3, ["x", "y", "z"][value % 3]);
-                let (row, col) = (tactel / self.shape.cols, tactel % self.shape.cols);
-                let frames = self.params.rest_frames;
-                Some(format!(
-                    "the pad did not rest: {axis} of row {row}, column {col} changed within {frames} frames; start again \
-                     while nothing touches the pad"
-                ))
-            }
+            Phase::Failed(flaw) => Some(self.describe(flaw)),
             Phase::Passed if self.params.rest_frames > 0 => {
                 Some(format!("the pad rested with a noise of {:.3} {} along an axis", state.noise, self.shape.unit))
             }
             _ => None,
-        }
-    }
-
-    fn returned(&self, state: &mut State) {
-        if self.params.rest_frames > 0 {
-            state.rest.phase = Phase::FIRST;
         }
     }
 
@@ -161,7 +168,7 @@ impl Node for CalibrateVectors {
     }
 
     fn tare(&self, state: &mut State) {
-        self.returned(state);
+        state.rest.phase = Phase::FIRST;
     }
 
     fn step(&self, _: &Tick, inputs: Inputs<'_>, out: &mut Outputs, state: &mut State) {
@@ -216,30 +223,79 @@ impl CalibrateVectors {
             rest.phase = Phase::Resting { frames: frames + 1, is_second };
             return;
         }
-        let counts = [first as f64, second as f64];
-        let judged = |sums: &[[f64; 2]; 2]| {
-            [0, 1].map(|half| {
-                let mean = sums[half][0] / counts[half];
-                [mean, (sums[half][1] / counts[half] - mean * mean).max(0.0)]
-            })
-        };
-        let is_unsteady = |sums: &[[f64; 2]; 2]| {
-            let [[m1, v1], [m2, v2]] = judged(sums);
-            (m2 - m1).abs() > SIGNIFICANT * (v1 / counts[0] + v2 / counts[1]).sqrt()
-        };
-        rest.phase = match rest.sums.iter().position(is_unsteady) {
+        rest.phase = match self.flaw(rest) {
             None => Phase::Passed,
             Some(_) if !is_second => Phase::Resting { frames: 0, is_second: true },
-            Some(value) => Phase::Failed(value),
+            Some(flaw) => Phase::Failed(flaw),
         };
         if rest.phase == Phase::Passed {
             let mut variance = 0.0;
             for ((zero, first), sums) in zeros.iter_mut().zip(&rest.first).zip(&rest.sums) {
-                let [[m1, v1], [m2, v2]] = judged(sums);
+                let [[m1, v1], [m2, v2]] = self.judged(sums);
                 *zero = (f64::from(*first) + 0.5 * (m1 + m2)) as f32;
                 variance += 0.5 * (v1 + v2);
             }
             *noise = (variance / zeros.len() as f64).sqrt();
+        }
+    }
+
+    /// Returns the mean and the variance of a value in both halves.
+    fn judged(&self, sums: &[[f64; 2]; 2]) -> [[f64; 2]; 2] {
+        let halves = self.halves();
+        [0, 1].map(|half| {
+            let count = halves[half] as f64;
+            let mean = sums[half][0] / count;
+            [mean, (sums[half][1] / count - mean * mean).max(0.0)]
+        })
+    }
+
+    /// Returns what is wrong with the frames at rest.
+    fn flaw(&self, rest: &mut Rest) -> Option<Flaw> {
+        let variance = |sums: &[[f64; 2]; 2]| self.judged(sums).iter().map(|[_, v]| 0.5 * v).sum::<f64>();
+        let mut medians = [0.0; 3];
+        for (axis, median) in medians.iter_mut().enumerate() {
+            rest.sorted.clear();
+            rest.sorted.extend(rest.sums.iter().skip(axis).step_by(3).map(variance));
+            rest.sorted.sort_unstable_by(f64::total_cmp);
+            *median = rest.sorted[rest.sorted.len() / 2];
+        }
+        let [first, second] = self.halves().map(|frames| frames as f64);
+        let is_unsteady = |(i, sums): (usize, &[[f64; 2]; 2])| {
+            let [[m1, _], [m2, _]] = self.judged(sums);
+            (m2 - m1).abs() > SIGNIFICANT * (medians[i % 3] / first + medians[i % 3] / second).sqrt()
+        };
+        if let Some(value) = rest.sums.iter().enumerate().position(is_unsteady) {
+            return Some(Flaw::Unsteady(value));
+        }
+        // In a pad that mostly repeats its readings, one that repeats them may be sound.
+        if self.params.may_repeat || medians == [0.0; 3] {
+            return None;
+        }
+        let is_constant = |sums: &[[f64; 2]; 2]| *sums == [[0.0; 2]; 2];
+        (0..3).find_map(|axis| {
+            let constant = || (axis..rest.sums.len()).step_by(3).filter(|i| is_constant(&rest.sums[*i]));
+            (constant().count() > self.shape.tactels().div_ceil(DEAD_FRACTION))
+                .then(|| constant().next().map(Flaw::Dead))?
+        })
+    }
+
+    /// Describes why the pad does not rest.
+    fn describe(&self, flaw: Flaw) -> String {
+        let frames = self.params.rest_frames;
+        let place = |value: usize| {
+            let (tactel, axis) = (value / 3, ["x", "y", "z"][value % 3]);
+            format!("{axis} of row {}, column {}", tactel / self.shape.cols, tactel % self.shape.cols)
+        };
+        match flaw {
+            Flaw::Unsteady(value) => format!(
+                "the pad did not rest: {} changed within {frames} frames; start again while nothing touches the pad",
+                place(value)
+            ),
+            Flaw::Dead(value) => format!(
+                "an axis is dead: {} and others of this axis never changed in {frames} frames; mend the pad, or write \
+                 `may_repeat = true` if it has no noise at rest",
+                place(value)
+            ),
         }
     }
 
@@ -328,6 +384,85 @@ mod tests {
         assert!(found.contains("y of row 1, column 1 changed within 16 frames"), "{found}");
         run(&mut rig, 0.0, 20);
         assert!(rig.get::<VectorImage>("vectors").is_none(), "a pad that failed stays absent");
+    }
+
+    /// Rests with white noise of 2 raw, about these zeros.
+    fn rested(params: &str, zero: impl Fn(usize) -> f64) -> NodeRig {
+        let mut rig = rig(params).unwrap();
+        let mut random = Random::new(8, 0);
+        for _ in 0..40 {
+            let noise: Vec<f64> = (0..18).map(|_| 2.0 * random.normal()).collect();
+            show(&mut rig, |i| zero(i) + noise[i]);
+        }
+        rig
+    }
+
+    #[test]
+    fn a_dead_axis_does_not_pass() {
+        // z of every tactel never changes.
+        let dead = |params: &str| {
+            let mut rig = rig(params).unwrap();
+            let mut random = Random::new(8, 0);
+            for _ in 0..80 {
+                let noise: Vec<f64> = (0..18).map(|_| random.normal()).collect();
+                show(&mut rig, |i| if i % 3 == 2 { 7.0 } else { noise[i] });
+            }
+            rig
+        };
+        let rig = dead("gain = [1.0, 1.0, 1.0]");
+        assert_eq!(rig.get::<bool>("failed").copied(), Some(true));
+        let found = rig.found().unwrap();
+        assert!(found.contains("an axis is dead: z of row 0, column 0 and others"), "{found}");
+        assert!(dead("gain = [1.0, 1.0, 1.0]\nmay_repeat = true").get::<VectorImage>("vectors").is_some());
+    }
+
+    #[test]
+    fn sound_pads_rest_at_the_first_attempt() {
+        // White noise on a pad with many values, in the shortest rest.
+        let shape = ImageShape { rows: 64, cols: 64, pitch: [0.005; 2], unit: Unit::RAW };
+        for seed in 0..10 {
+            let inputs = [("vectors", VectorImageShape(shape.clone()).into())];
+            let mut rig =
+                NodeRig::new::<CalibrateVectors>("gain = [1.0, 1.0, 1.0]\nrest_frames = 16", &inputs).unwrap();
+            let mut random = Random::new(seed, 0);
+            for _ in 0..16 {
+                let mut image = VectorImage::zeros(64, 64);
+                image.cells_mut().as_flattened_mut().iter_mut().for_each(|value| *value = random.normal() as f32);
+                rig.set("vectors", image);
+                rig.step();
+            }
+            assert_eq!(rig.get::<bool>("failed").copied(), Some(false), "seed {seed}");
+        }
+    }
+
+    #[test]
+    fn the_zeros_outlast_an_absence_and_a_tare_takes_them_anew() {
+        let mut rig = rested("gain = [1.0, 1.0, 1.0]", |_| 100.0);
+        let force = |rig: &mut NodeRig, value: f64| {
+            show(rig, |_| value);
+            rig.get::<VectorImage>("vectors").map(|image| image.cells()[2][1])
+        };
+        let near = |found: Option<f32>, wanted: f32| found.is_some_and(|found| (found - wanted).abs() < 1.5);
+        assert!(near(force(&mut rig, 150.0), 50.0));
+        rig.lose("vectors");
+        for _ in 0..500 {
+            rig.step();
+        }
+        assert!(rig.get::<VectorImage>("vectors").is_none());
+        assert!(near(force(&mut rig, 150.0), 50.0), "a pad in contact cannot rest again");
+        // It is refused while something touches the pad.
+        let refused = rig.can_tare().unwrap().unwrap_err();
+        assert!(refused.contains("something touches the pad") && refused.contains("50."), "{refused}");
+        assert!(near(force(&mut rig, 105.0), 5.0));
+        assert_eq!(rig.can_tare(), Some(Ok(())));
+        rig.tare();
+        assert_eq!(force(&mut rig, 105.0), None, "it rests");
+        let mut random = Random::new(9, 0);
+        for _ in 0..39 {
+            let noise: Vec<f64> = (0..18).map(|_| 2.0 * random.normal()).collect();
+            show(&mut rig, |i| 105.0 + noise[i]);
+        }
+        assert!(near(force(&mut rig, 105.0), 0.0));
     }
 
     #[test]

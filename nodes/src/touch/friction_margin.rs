@@ -6,20 +6,24 @@ use tactflow_runtime::source::Code;
 
 /// Measures how near a contact is to slip: 1 if nothing drags it, 0 at the limit of friction.
 ///
-/// A contact of the normal force n slips when the drag reaches mu n, with the coefficient of `friction` mu (Coulomb). The
-/// drag is the tangential force t. With `in.torque` and `in.lever` of `shear`, a torque q about the normal counts too:
-/// the drag is d = sqrt(t² + (q / lever)²). This ellipsoid is exact for a push without a torque and for a torque without
-/// a push, and an approximation between them (Howe and Cutkosky 1996, *Practical force-motion models for sliding
-/// manipulation*). Without both inputs, an object that turns on the pad is not seen.
+/// A contact of the normal force n slips when the object drags it with mu n, where mu is the coefficient of `friction`
+/// (Coulomb). The load on the friction is l = sqrt(t² + (q / lever)²), with the tangential force t and, if `in.torque` and
+/// `in.lever` of `shear` are wired, the torque q about the normal. This ellipsoid is exact for a push without a torque, and
+/// for a torque without a push if the pressure is symmetric about its centre. Otherwise friction bears less of a torque than
+/// mu n lever: down to two thirds for two tactels, one with a quarter of the force (Howe and Cutkosky 1996, *Practical
+/// force-motion models for sliding manipulation*). Without both inputs, an object that turns on the pad is not seen.
 ///
-/// - `margin` is 1 - d / (mu n). It is negative while the contact slips and the friction that is left is below mu n, and
-///   when `friction` is too low. It is absent if n is below `min_force`: noise would decide.
-/// - `spare` is the normal force beyond the one that keeps the margin at `keep`: n - max(d / (mu (1 - keep)), `least`).
-///   It is negative if the contact must be pressed harder. A force controller with `spare = 0` as its setpoint holds an
-///   object without slip, and presses no harder than that. It is linear in n, and the margin is not.
+/// - `margin` is 1 - l / (mu n). Below 0, the object drags with more than the stated friction can bear. It is absent if n is
+///   below `margin_from`: noise would decide.
+/// - `spare` is the normal force beyond the one that keeps the margin at `keep_margin`: n - max(l / (mu (1 - keep_margin)),
+///   `least_force`). It is negative if the contact must be pressed harder. A force controller with `spare = 0` as its
+///   setpoint holds an object without slip, and presses no harder than that. It is linear in n, and the margin is not.
 ///
-/// All outputs are absent while an input is. Measure `friction` with the object and the pad: pull until it slips, and
-/// divide the drag by the normal force. Set it to the lowest value that was seen.
+/// **A slip is not detected.** While a contact slips, the friction that is really there bounds the drag. If `friction` is
+/// stated too high, the margin then stays above 0, and the contact slips on: state the lowest friction that you have
+/// measured. To measure it, pull with a constant normal force until the object slips, and divide the drag by that force.
+///
+/// All outputs are absent while an input is.
 ///
 /// ```toml
 /// [nodes.friction_margin]
@@ -30,8 +34,8 @@ use tactflow_runtime::source::Code;
 /// in.torque = "shear.torque"
 /// in.lever = "shear.lever"
 /// friction = 0.4                      # of the pad on the object
-/// keep = 0.3
-/// least = 1.0                         # if nothing drags [N]
+/// keep_margin = 0.3
+/// least_force = 1.0                   # if nothing drags [N]
 /// ```
 #[derive(Describe)]
 pub struct FrictionMargin {
@@ -46,13 +50,13 @@ pub struct Params {
     friction: f64,
     /// Margin that `spare` keeps, from 0 to below 1.
     #[param(unit = "1", range = 0.0..=0.95, default = 0.3, live)]
-    keep: f64,
+    keep_margin: f64,
     /// Smallest normal force that `spare` keeps.
     #[param(unit = "N", range = 0.0.., default = 0.5, live)]
-    least: f64,
-    /// Normal force below which there is no margin.
+    least_force: f64,
+    /// Normal force from which on there is a margin.
     #[param(unit = "N", above = 0.0, default = 0.1)]
-    min_force: f64,
+    margin_from: f64,
 }
 
 /// What `friction_margin` reads.
@@ -78,7 +82,7 @@ pub struct Inputs<'a> {
 /// What `friction_margin` writes.
 #[derive(Outputs)]
 pub struct Outputs {
-    /// 1 if nothing drags the contact, 0 at the limit of friction; absent below `min_force`.
+    /// 1 if nothing drags the contact, 0 at the limit of friction; absent below `margin_from`.
     #[port(unit = "1", frame = "A", quantity = "margin")]
     margin: Out<Scalar>,
     /// Normal force beyond the one that keeps the margin.
@@ -108,18 +112,18 @@ impl Node for FrictionMargin {
     }
 
     fn step(&self, _: &Tick, inputs: Inputs<'_>, out: &mut Outputs, (): &mut ()) {
-        let Params { friction, keep, least, min_force } = self.params;
+        let Params { friction, keep_margin, least_force, margin_from } = self.params;
         let turning = match (inputs.torque, inputs.lever) {
             (Some(torque), Some(lever)) if *lever > 0.0 => *torque / *lever,
-            // All of the force is at one point, which bears no torque.
+            // The force of a single tactel has no lever, and its torque about itself is 0.
             _ => 0.0,
         };
-        let drag = libm::hypot(libm::hypot(*inputs.fx, *inputs.fy), turning);
+        let load = libm::hypot(libm::hypot(*inputs.fx, *inputs.fy), turning);
         let force = *inputs.force;
-        if force >= min_force {
-            out.margin.set(1.0 - drag / (friction * force));
+        if force >= margin_from {
+            out.margin.set(1.0 - load / (friction * force));
         }
-        out.spare.set(force - (drag / (friction * (1.0 - keep))).max(least));
+        out.spare.set(force - (load / (friction * (1.0 - keep_margin))).max(least_force));
     }
 }
 
@@ -130,7 +134,7 @@ mod tests {
 
     use super::*;
 
-    const PARAMS: &str = "friction = 0.5\nkeep = 0.2\nleast = 1.0";
+    const PARAMS: &str = "friction = 0.5\nkeep_margin = 0.2\nleast_force = 1.0";
 
     fn rig(params: &str, inputs: &[&'static str]) -> Result<NodeRig, Mistakes> {
         let unit = |name: &str| match name {
@@ -161,7 +165,7 @@ mod tests {
         assert!(is_near(push(0.6, -0.8, 4.0), [0.5, 1.5]), "{:?}", push(0.6, -0.8, 4.0));
         assert!(is_near(push(-1.2, 1.6, 4.0), [0.0, -1.0]), "at the limit");
         assert!(is_near(push(0.0, 3.0, 4.0), [-0.5, -3.5]), "beyond it");
-        // At a spare force of 0 the margin is `keep`.
+        // At a spare force of 0 the margin is `keep_margin`.
         assert!(is_near(push(0.0, 1.6, 4.0), [0.2, 0.0]));
     }
 

@@ -13,11 +13,12 @@ use super::common::check_same_array;
 /// - `force`: the sum of n_ij, as `force` of `moments`;
 /// - `torque`: the sum of (c_ij - c) × t_ij about the centre of pressure c, from +x toward +y. A pure push through the
 ///   centre has none; an object that turns on the pad has one without a push;
-/// - `lever`: the mean distance of the normal force from the centre of pressure, Σ n_ij |c_ij - c| / Σ n_ij. Friction of a
-///   coefficient mu can bear a torque of mu `force` `lever` about c, if nothing pushes (Howe and Cutkosky 1996, *Practical
-///   force-motion models for sliding manipulation*).
+/// - `lever`: the mean distance of the normal force from the centre of pressure, Σ n_ij |c_ij - c| / Σ n_ij. `friction_margin` needs it.
 ///
 /// `torque` and `lever` are absent if the normal force is not positive. All outputs are absent without a region.
+///
+/// The region must be of an image with the rows and columns of the vector image: leave `flip_x`, `flip_y` and `transpose`
+/// of `tactile_source` out for such a pad.
 ///
 /// The centre and the lever are as exact as the resolution of the pad: foam that spreads a load over several tactels
 /// makes the lever of a point longer by about the width of the spread.

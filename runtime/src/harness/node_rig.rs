@@ -169,6 +169,17 @@ impl NodeRig {
         self.runner.found()
     }
 
+    /// Whether the node can take its zero anew, by its inputs as of now; see [`Node::can_tare`].
+    #[must_use]
+    pub fn can_tare(&self) -> Option<Result<(), String>> {
+        self.runner.can_tare(&self.tick, &self.bus)
+    }
+
+    /// Makes the node take its zero anew; see [`Node::tare`].
+    pub fn tare(&mut self) {
+        self.runner.tare();
+    }
+
     /// Returns the mark of an output.
     ///
     /// # Panics

@@ -28,7 +28,7 @@
 //! | `Many<'a, T>` | | any is new or lost | `None` for that wire; any number of wires, each named in the graph |
 //!
 //! A port declares the arguments of its kind, with `"_"` for none: `unit` and `frame` (`Scalar`, `Features`, `Image`,
-//! `Regions`), `frame` (`Mask`, `Twist`), `frame` and `reference` (`Pose`), `unit` and `robot` (`Joints`), `frame` and
+//! `VectorImage`, `Regions`), `frame` (`Mask`, `Twist`), `frame` and `reference` (`Pose`), `unit` and `robot` (`Joints`), `frame` and
 //! `robot` (`Jacobian`), nothing (`Flag`). A capital letter is a variable: its value is known when the graph is loaded,
 //! and is the same for all ports of the node. `"$name"` is the frame or unit that the parameter `name` holds.
 //!

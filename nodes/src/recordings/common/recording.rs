@@ -16,7 +16,7 @@ pub struct Recording {
     pub frames: Vec<Frame>,
     /// The windows of all frames, one after the other, row after row.
     pub cells: Vec<f32>,
-    /// x and y of each of those cells, whose z it is then; empty for a pad with one axis.
+    /// Of a pad with three axes: x and y of each of those cells, which are z. Empty for a pad with one axis.
     pub drag: Vec<[f32; 2]>,
     /// Index in the whole array of each cell that does not exist, in order.
     pub dead: Vec<usize>,

@@ -22,7 +22,7 @@ pub(super) enum Role {
     /// The tactel with this index in a frame; with three axes, its z.
     Tactel(usize),
     /// The x (0) or the y (1) of the tactel with this index.
-    Drag(usize, usize),
+    Drag(usize, u8),
     /// The time.
     Time,
     /// A force that another sensor measured.
@@ -76,6 +76,10 @@ impl CsvColumns {
             columns.roles.push(Role::Tactel(found));
             places.extend(place);
             found += 1;
+        }
+        // One and the same axis everywhere is that of a pad with one axis.
+        if axes.iter().all(|axis| *axis == axes[0]) {
+            axes.clear();
         }
         columns.size = if places.is_empty() {
             let size @ [rows, cols] = hints.size(None)?;
@@ -136,7 +140,7 @@ impl CsvColumns {
                 return Err(format!("row {row} and column {col}{axis} appear twice"));
             }
             *role = match axis {
-                Some(axis @ (0 | 1)) => Role::Drag(index, axis),
+                Some(axis @ (0 | 1)) => Role::Drag(index, axis as u8),
                 _ => Role::Tactel(index),
             };
         }

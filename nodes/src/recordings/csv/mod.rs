@@ -195,8 +195,7 @@ impl CsvReader {
                 match columns.roles.get(found) {
                     Some(Role::Tactel(index)) => frame[*index] = value,
                     Some(Role::Drag(index, axis)) => {
-                        cell.check((value as f32).is_finite(), "an x or a y must be a number")?;
-                        drag[*index][*axis] = value;
+                        drag[*index][usize::from(*axis)] = value;
                     }
                     Some(Role::Time) => time = Some(self.since_start(value * columns.second, cell)?),
                     Some(Role::Force) => {
@@ -215,7 +214,12 @@ impl CsvReader {
                 let place = || notation.fields(line).enumerate().find(is_here).map_or(line, |(_, at)| at);
                 self.reel.cell(*value).map_err(|message| place().error(message))?;
             }
-            self.reel.drag.extend(drag.iter().map(|drag| drag.map(|value| value as f32)));
+            for (drag, z) in drag.iter().zip(&frame) {
+                // A tactel that does not exist has no drag.
+                let drag = if z.is_nan() { [0.0; 2] } else { drag.map(|value| value as f32) };
+                line.check(drag.iter().all(|value| value.is_finite()), "an x or a y is not a number")?;
+                self.reel.drag.push(drag);
+            }
             self.frame(time);
         }
         Ok(())

@@ -219,6 +219,12 @@ fn names_with_axes_are_of_a_pad_with_three() {
     let other = "time,r1c3z,r1c1x,r1c1y,r1c1z,r1c2z,r1c2x,r1c2y,r1c3x,r1c3y";
     let other = format!("{other}\n0.0,9,1,2,3,6,4,5,7,8\n0.1,90,-1,-2,30,60,-4,-5,-7,-8\n");
     assert_eq!(read(other.as_bytes(), "press.csv", &hints()).unwrap(), recording);
+    // A tactel that does not exist, and names of a pad with one axis.
+    let dead = text.replace("\n0.0,1,2,3", "\n0.0,nan,nan,nan").replace("\n0.1,-1,-2,30", "\n0.1,,,");
+    assert_eq!(read(dead.as_bytes(), "press.csv", &hints()).unwrap().dead, [0]);
+    let single = "time,t0_0_z,t0_1_z,t0_2_z\n0.0,3,6,9\n0.1,30,60,90\n";
+    let single = read(single.as_bytes(), "press.csv", &hints()).unwrap();
+    assert!(single.drag.is_empty() && single.cells == recording.cells);
     let cases = [
         (text.replace("t0_2_z", "t0_2"), "only some names end with an axis (x, y or z)"),
         (text.replace("t0_2_y", "t0_2_x"), "row 0 and column 2 with the axis x appear twice"),
@@ -226,7 +232,7 @@ fn names_with_axes_are_of_a_pad_with_three() {
             text.replace("t0_2_", "t1_2_"),
             "the names reach 2 rows by 3 columns with three axes each, but there are 9 names",
         ),
-        (text.replace("0.1,-1", "0.1,nan"), "an x or a y must be a number"),
+        (text.replace("0.1,-1", "0.1,nan"), "an x or a y is not a number"),
     ];
     for (text, message) in cases {
         let found = complaints(read(text.as_bytes(), "press.csv", &hints()));

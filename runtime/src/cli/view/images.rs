@@ -118,7 +118,7 @@ impl ImageHistory {
             true => "; >< centre of the contact",
         };
         let drag = match self.kind {
-            Kind::VectorImage => "\n  arrows: the drag of the object, where it is not small",
+            Kind::VectorImage => "\n  arrows: x and y of the tactels, where they are not small",
             _ => "",
         };
         text + &raster.legend(scale, self.shape.unit) + mark + drag + "\n"

@@ -158,8 +158,7 @@ fn default_ports(nodes: &[PlannedNode], ports: &BTreeMap<PortRef, PlannedPort>) 
     let roles: Vec<PortRef> = ports.keys().copied().filter(is_role).collect();
     let of_nodes = nodes.iter().flat_map(PlannedNode::outputs).map(|(source, _)| source);
     let all: Vec<PortRef> = of_nodes.chain(roles.iter().copied()).collect();
-    let is_picture = |source: &PortRef| ports.get(source).is_some_and(|port| port.shape.kind().is_picture());
-    let mut shown: Vec<PortRef> = roles.iter().copied().filter(is_picture).collect();
+    let mut shown: Vec<PortRef> = roles.iter().copied().filter(of_kind(Kind::Image)).collect();
     let Some(kind) = KINDS.into_iter().find(|kind| all.iter().any(of_kind(*kind))) else { return shown };
     let mut count = 0;
     shown.extend(all.into_iter().filter(of_kind(kind)).take_while(|source| {

@@ -110,7 +110,8 @@ fn tangential(params: &Params, names: &[String], axis: usize, mistakes: &mut Mis
         }
         found.map(|found| (found, sign))
     };
-    let [x, y] = [find(x)?, find(y)?];
+    let [x, y] = [find(x), find(y)];
+    let [x, y] = [x?, y?];
     if x.0 == y.0 || x.0 == axis || y.0 == axis {
         mistakes.push(wrong("x, y and the `axis` of the image must be three axes".into()).help("name each axis once"));
         return None;
