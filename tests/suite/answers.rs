@@ -92,7 +92,7 @@ fn a_description_says_what_a_kind_a_role_and_a_device_are() {
             "velocity_arm",
             &[
                 "velocity_arm (role)",
-                "Filled by the devices: `mock_arm`, `sim_bench`, `sim_pair`, `lockstep`, `lwr_fri`, `ur`.",
+                "Filled by the devices: `mock_arm`, `sim_bench`, `sim_pair`, `lockstep`, `replay`, `lwr_fri`, `ur`.",
                 "Commands",
             ],
         ),
