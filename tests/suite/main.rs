@@ -116,6 +116,7 @@ mod ur_start;
 mod verify;
 mod view;
 mod warnings;
+mod watching;
 mod windows;
 mod words;
 mod wrench;

@@ -9,6 +9,7 @@ pub(super) mod log;
 mod outside;
 mod ports;
 mod progress;
+mod saved;
 mod slow;
 mod status;
 mod stepping;
@@ -25,6 +26,7 @@ use files::OutputFiles;
 use log::NodeLog;
 use outside::{Outside, changes};
 use progress::Progress;
+use saved::SavedFiles;
 use stepping::Stepping;
 use summary::Summary;
 
@@ -112,6 +114,9 @@ pub struct JobOptions {
     /// time only
     #[arg(long, value_name = "TIME", num_args = 0..=1, require_equals = true, value_parser = duration)]
     pub step: Option<Option<f64>>,
+    /// Run again from the beginning when a file of the graph is saved. In virtual time only
+    #[arg(long, conflicts_with_all = ["realtime", "listen", "step"])]
+    pub watch: bool,
     /// Open no socket, so that `ps`, `get`, `set`, `send` and `watch` do not reach the run; in virtual time there is none
     #[cfg(unix)]
     #[arg(long)]
@@ -147,6 +152,10 @@ impl JobOptions {
         if self.step.is_some() && is_real {
             let why = "a run in real time cannot pause; `stop` brings an arm to rest";
             return Err(format!("`--step` requires virtual time: {why}"));
+        }
+        if self.watch && is_real {
+            let why = "another graph is not exchanged for one that moves an arm; end the run, and start it again";
+            return Err(format!("`--watch` requires virtual time: {why}"));
         }
         Ok(())
     }
@@ -189,18 +198,52 @@ impl Job {
         if let Err(message) = self.options.reserve_output(shell) {
             return shell.refuse(message);
         }
-        let (plan, request) = match slow::compile(&self.request, shell) {
-            Ok(compiled) => compiled,
-            Err(code) => return code,
+        if self.options.watch {
+            return self.watch(shell);
+        }
+        match slow::compile(&self.request, shell, &mut |_| {}) {
+            Ok((plan, request)) => self.run_plan(plan, &request, shell, None),
+            Err(code) => Ok(code),
+        }
+        .unwrap_or_else(|message| shell.refuse(message))
+    }
+
+    /// Runs the graph again each time that one of its files is saved, until a signal ends it. Returns the exit code of the
+    /// last run.
+    fn watch(&self, shell: &Shell) -> u8 {
+        let interrupt = match Interrupt::catch() {
+            Ok(interrupt) => interrupt,
+            Err(error) => return shell.refuse(format_args!("cannot run: {error}")),
         };
-        self.run_plan(plan, &request, shell).unwrap_or_else(|message| shell.refuse(message))
+        let mut saved = SavedFiles::new(&self.request.graph);
+        loop {
+            saved.begin();
+            let code = match slow::compile(&self.request, shell, &mut |sources| saved.follow(sources)) {
+                Ok((plan, request)) => match self.run_plan(plan, &request, shell, Some(&mut saved)) {
+                    Ok(code) => code,
+                    Err(message) => return shell.refuse(message),
+                },
+                Err(code) => code,
+            };
+            if !interrupt.is_requested() && !saved.has_ended_the_run() {
+                shell.say_beside("`--watch`: waiting until a file of the graph is saved; Ctrl-C ends it");
+            }
+            let Some(path) = saved.wait(&interrupt) else { return code };
+            shell.say_beside(&format!("`{}` was saved", path.display()));
+        }
     }
 
     /// Runs a plan and returns the exit code.
     ///
     /// # Errors
     /// If the arguments do not fit the graph, before the run starts.
-    fn run_plan(&self, plan: Compiled, request: &Request, shell: &Shell) -> Result<u8, String> {
+    fn run_plan(
+        &self,
+        plan: Compiled,
+        request: &Request,
+        shell: &Shell,
+        mut saved: Option<&mut SavedFiles>,
+    ) -> Result<u8, String> {
         plan.warnings().iter().for_each(|report| shell.show(report));
         let interrupt = Arc::new(Interrupt::catch().map_err(|error| format!("cannot run: {error}"))?);
         let is_real = self.options.realtime || plan.is_live();
@@ -225,19 +268,14 @@ impl Job {
         let patience = if is_real { Patience::Limited } else { Patience::Interruptible };
         let patience = patience(Arc::clone(&interrupt));
         shell.set_patience(&patience);
-        if self.print != Print::Nothing {
-            shell.print_text();
-        }
-        let period = milliseconds(seconds(engine.period()));
-        self.say(shell, &format!("{}: {} nodes, one tick every {period}", self.title, engine.order().count()));
-        silences.iter().for_each(|line| self.say(shell, line));
-        shell.begin_log();
+        self.announce(shell, &engine, &silences);
         let mut summary = Summary::new(&engine, self.print == Print::Ports, start);
         let mut log = NodeLog::new(&engine);
         let end = self.options.duration.or_else(|| engine.end().map(seconds));
         let terminal = Some(shell.err()).filter(|_| self.print != Print::Nothing);
         let mut progress = Progress::new(end, terminal, shell.has_colour_on_stderr());
         let mut options = self.options.of_run();
+        options.cancel = saved.as_ref().map(|saved| Arc::clone(&saved.end));
         let mut stepping = Stepping::of(self.options.step, &mut options, &interrupt)?;
         let Outside { mut changes, mut socket } = Outside::open(changes, facts, &engine, &mut options, shell);
         let outcome = without_panic_messages(|| {
@@ -249,6 +287,7 @@ impl Job {
                 files.add(engine, &patience);
                 socket.iter_mut().for_each(|socket| socket.publish(engine));
                 progress.show(seconds(engine.now()), engine.ticks(), |style| summary.live(engine, style));
+                saved.iter_mut().for_each(|saved| saved.look());
                 if let Some(stepping) = &mut stepping {
                     let show = |words: &str| shell.say(&paused(engine, &summary, shell.has_colour(), words));
                     stepping.after(seconds(engine.now()), show);
@@ -272,6 +311,17 @@ impl Job {
         let code = self.report_end(shell, &engine, outcome);
         unfinished.iter().for_each(|line| shell.warning(line));
         Ok(code.max(files.finish(shell, &engine)))
+    }
+
+    /// Prints what is about to run, and what its devices do without commands.
+    fn announce(&self, shell: &Shell, engine: &Engine, silences: &[String]) {
+        if self.print != Print::Nothing {
+            shell.print_text();
+        }
+        let period = milliseconds(seconds(engine.period()));
+        self.say(shell, &format!("{}: {} nodes, one tick every {period}", self.title, engine.order().count()));
+        silences.iter().for_each(|line| self.say(shell, line));
+        shell.begin_log();
     }
 
     /// Reports words that were not sent and the fault that ended the run; returns the exit code.

@@ -3,6 +3,7 @@
 use super::commissioning::{UNCOMMISSIONED_FRACTION, uncommissioned};
 use crate::cli::shell::Shell;
 use crate::graph::{self, Compiled, Request};
+use crate::source::SourceMap;
 
 /// Parses a fraction of the limits: a parser for arguments.
 pub(super) fn fraction(text: &str) -> Result<f64, String> {
@@ -11,12 +12,20 @@ pub(super) fn fraction(text: &str) -> Result<f64, String> {
 }
 
 /// Compiles a graph, slowly if it moves a real arm that is not commissioned and nobody asked for a speed. Returns the
-/// request that was compiled.
+/// request that was compiled. `seen` gets the files that were read, also those of a graph with mistakes.
 ///
 /// # Errors
 /// The exit code, after the mistakes are printed.
-pub(super) fn compile(request: &Request, shell: &Shell) -> Result<(Compiled, Request), u8> {
-    let compiled = |request: &Request| graph::compile(shell.catalogue(), request).map_err(|r| shell.reject(&r));
+pub(super) fn compile(
+    request: &Request,
+    shell: &Shell,
+    seen: &mut dyn FnMut(&SourceMap),
+) -> Result<(Compiled, Request), u8> {
+    let mut compiled = |request: &Request| {
+        let compiled = graph::compile(shell.catalogue(), request);
+        seen(compiled.as_ref().map_or_else(|report| &report.sources, |plan| &plan.sources));
+        compiled.map_err(|report| shell.reject(&report))
+    };
     let plan = compiled(request)?;
     if request.slow.is_some() {
         return Ok((plan, request.clone()));
