@@ -10,8 +10,7 @@ use tactflow_runtime::source::Code;
 /// (Coulomb). The load on the friction is l = sqrt(t² + (q / lever)²), with the tangential force t and, if `in.torque` and
 /// `in.lever` of `shear` are wired, the torque q about the normal. This ellipsoid is exact for a push without a torque, and
 /// for a torque without a push if the pressure is symmetric about its centre. Otherwise friction bears less of a torque than
-/// mu n lever: down to two thirds for two tactels, one with a quarter of the force (Howe and Cutkosky 1996, *Practical
-/// force-motion models for sliding manipulation*). Without both inputs, an object that turns on the pad is not seen.
+/// mu n lever, and at least half of it (Howe and Cutkosky 1996, *Practical force-motion models for sliding manipulation*). Without both inputs, an object that turns on the pad is not seen.
 ///
 /// - `margin` is 1 - l / (mu n). Below 0, the object drags with more than the stated friction can bear. It is absent if n is
 ///   below `margin_from`: noise would decide.
