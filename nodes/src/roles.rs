@@ -171,7 +171,7 @@ const PATH: &str = "Distance, in the sensor's plane, of the reported contact poi
     absent if it has none [m].";
 const DISTANCE: &str = "Distance of the reported contact point from the object's surface; absent without a report [m].";
 const COVERAGE: &str =
-    "Fraction of the surface facing the sensor at the start that is within 1 cm of a reported point [1].";
+    "Fraction of the surface that faces the sensor at the start within 40° and is within 1 cm of a reported point [1].";
 const COMMON_NOISE: &str = "Standard deviation of the pressure due to the noise that all tactels share; absent without contact \
     [N/tactel].";
 const OWN_NOISE: &str =

@@ -21,6 +21,43 @@ impl Odometer {
     }
 }
 
+/// Measures how far a sensor is inclined to its first pose.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct Inclination {
+    /// The sensor's z in the base, in the first pose.
+    first: Option<Vector3<f64>>,
+}
+
+impl Inclination {
+    /// Returns the angle between the sensor's z in a pose and in the first pose [rad]; NaN for a pose that is not finite.
+    pub fn of(&mut self, pose: &Pose) -> f64 {
+        let z = pose.0.rotation * Vector3::z();
+        let first = self.first.get_or_insert(z);
+        libm::atan2(first.cross(&z).norm(), first.dot(&z))
+    }
+}
+
+/// The direction across parallel planes, in the plane of a sensor that moves over a surface.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct Planes {
+    /// The normal of the planes in the base: an axis of the sensor in the first pose.
+    normal: Option<Vector3<f64>>,
+}
+
+/// A sensor whose plane is inclined to the normal by less than this has no direction across: the sine of 6° [1].
+const MIN_ACROSS: f64 = 0.1;
+
+impl Planes {
+    /// Returns the unit vector across the planes in the x and y of the sensor. `axis` is the normal of the planes in the
+    /// first pose, and the direction of a sensor that faces along the planes' normal.
+    pub fn across(&mut self, pose: &Pose, axis: [f64; 2]) -> [f64; 2] {
+        let first = || pose.0.rotation * Vector3::new(axis[0], axis[1], 0.0);
+        let normal = pose.0.rotation.inverse_transform_vector(self.normal.get_or_insert_with(first));
+        let length = libm::hypot(normal.x, normal.y);
+        if length > MIN_ACROSS { [normal.x / length, normal.y / length] } else { axis }
+    }
+}
+
 /// Detects that a sensor no longer makes progress, because an obstacle or a limit stops it.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct Stall {
@@ -76,6 +113,38 @@ mod tests {
         }
         odometer.step(&pose(1e308, 0.0, 0.7));
         assert_eq!(odometer.step(&pose(-1e308, 0.0, 0.7)), [0.0, 0.0], "a step that is not finite counts as none");
+    }
+
+    #[test]
+    fn the_inclination_is_the_angle_between_the_normals() {
+        let tilted = |roll: f64, yaw: f64| {
+            let turn =
+                Rotation3::from_axis_angle(&Vector3::z_axis(), yaw) * Rotation3::from_euler_angles(roll, 0.0, 0.0);
+            Pose(IsometryMatrix3::from_parts(Translation3::identity(), turn))
+        };
+        let mut inclination = Inclination::default();
+        for (pose, expected) in [(tilted(0.1, 0.0), 0.0), (tilted(0.1, 2.0), 0.168), (tilted(0.8, 0.0), 0.7)] {
+            let angle = inclination.of(&pose);
+            assert!((angle - expected).abs() < 1e-3, "{angle} {expected}");
+        }
+    }
+
+    #[test]
+    fn the_direction_across_keeps_to_the_planes_of_the_start() {
+        let of = |turn: Rotation3<f64>| Pose(IsometryMatrix3::from_parts(Translation3::identity(), turn));
+        let start = Rotation3::from_euler_angles(0.2, -0.4, 1.0);
+        let mut planes = Planes::default();
+        assert!((planes.across(&of(start), [0.0, 1.0])[1] - 1.0).abs() < 1e-12);
+        let normal = start * Vector3::y();
+        for turn in [[0.5, 0.0, 0.0], [0.0, 0.6, 0.0], [0.3, -0.7, 2.0]] {
+            let pose = start * Rotation3::from_euler_angles(turn[0], turn[1], turn[2]);
+            let [x, y] = planes.across(&of(pose), [0.0, 1.0]);
+            assert!((libm::hypot(x, y) - 1.0).abs() < 1e-12);
+            let along = pose * Vector3::new(y, -x, 0.0);
+            assert!(along.dot(&normal).abs() < 1e-12, "{turn:?}");
+        }
+        let upright = start * Rotation3::from_euler_angles(std::f64::consts::FRAC_PI_2, 0.0, 0.0);
+        assert_eq!(planes.across(&of(upright), [0.0, 1.0]), [0.0, 1.0]);
     }
 
     /// Returns when a sensor that moves at a fraction of its speed is found to be stuck, within 10 s [s].

@@ -11,10 +11,10 @@ const SPACING: f64 = 0.005;
 const HALF_WIDTH: f64 = 0.15;
 /// Distance from a reported point within which the surface counts as covered [m].
 const COVER_RADIUS: f64 = 0.01;
-/// Smallest component of a normal toward the sensor at the start; a steeper surface is not sampled [1].
-const MIN_FACING: f64 = 0.5;
+/// Smallest component of a normal toward the sensor at the start, the cosine of 40°; a steeper surface is not sampled [1].
+const MIN_FACING: f64 = 0.766_044;
 
-/// The part of an object's surface that faces the sensor, and how much of it has been touched.
+/// The part of an object's surface that faces the sensor within 40°, and how much of it has been touched.
 pub struct Survey {
     /// Points in the frame of the object, and whether each is covered.
     points: Vec<(Vec3, bool)>,
@@ -109,12 +109,13 @@ mod tests {
         let round = object(&ball(0.04, [0.0, 0.0, 0.05]));
         let mut survey = Survey::new(&round, Pose3::IDENTITY).unwrap();
         assert_eq!(survey.coverage(), 0.0);
-        survey.add(&round, Vec3::new(0.0, 0.0, 0.01));
-        // A disc of 1 cm of the cap with normals within 60° of the sensor's axis, which is a disc for the sensor.
-        let wanted = (0.01 / (0.04 * 3f64.sqrt() / 2.0)).powi(2);
+        let point = Vec3::new(0.0025, 0.0025, 0.0102);
+        survey.add(&round, point);
+        // A disc of 1 cm of the cap with normals within 40° of the sensor's axis, which is a disc for the sensor.
+        let wanted = (0.01 / (0.04 * 0.642_788_f64)).powi(2);
         assert!((survey.coverage() / wanted - 1.0).abs() < 0.3, "{} {wanted}", survey.coverage());
         let once = survey.coverage();
-        survey.add(&round, Vec3::new(0.0, 0.0, 0.01));
+        survey.add(&round, point);
         assert_eq!(survey.coverage(), once);
         assert!(Survey::new(&object(&thing(ShapeKind::Plane, [0.0; 3])), Pose3::IDENTITY).is_none());
     }

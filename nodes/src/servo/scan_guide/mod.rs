@@ -6,16 +6,19 @@ use tactflow_runtime::node::{Absence, Describe, In, Inputs, Mistakes, Node, Out,
 use tactflow_runtime::signal::{Flag, Pose, Scalar, Twist};
 
 use crate::usual::{USUAL_LENGTH_M, USUAL_M_PER_S};
-use scan::Scan;
+use scan::{Moved, Scan};
 
 /// Moves a sensor back and forth over a surface, in parallel strokes.
 ///
 /// The guidance of section V-E of the paper: while the servoing keeps the contact, V_ext slides the sensor along one of
 /// its axes, steps across, and comes back. Wire it to a `twist_adder`.
 ///
+/// **Rows.** The strokes are parallel: each lies in a plane of the base, and the planes stand across the sensor's axis at
+/// the start. So rows stay apart on a curved surface, also if the sensor turns about its normal meanwhile.
+///
 /// **Distance.** The scan follows the distance that the sensor moves over the surface, not a time: each step of
-/// `in.pose` is turned into the frame of the sensor and summed, u along the strokes and v across them. An arm that lags
-/// or is held therefore skips nothing. The scan is centred on its start: the sensor moves across by half of the width,
+/// `in.pose` is summed in the plane of the sensor, u along the strokes and v across them. An arm that lags or is held
+/// therefore skips nothing. The scan is centred on its start: the sensor moves across by half of the width,
 /// along by half of `stroke_m`, and then makes `strokes` strokes between u = ±`stroke_m`/2, each `step_m` beside the
 /// last.
 ///
@@ -24,6 +27,10 @@ use scan::Scan;
 /// when the sensor moves less than a fifth of the distance at its speed within 2 s: a controller that keeps the contact
 /// in the middle stops it at an edge. The scan then continues with the next leg. A step across that moves less than
 /// half of its width is the end of the surface, and of the scan.
+///
+/// **A cap.** With `max_tilt_rad`, a leg along the strokes also ends where the sensor is inclined by more than this to
+/// where the scan began. So strokes are as long as the surface is flat enough: `stroke_m` and `strokes` are then upper
+/// bounds. The first leg across ends there too, and the scan ends after a stroke that nowhere was flat enough.
 ///
 /// **One scan** begins with the contact, when a mode sets a speed, and when a mode sets another axis. To scan across
 /// and along, use two modes that set `axis`, each with `go` or `done = { when = "scan.done" }`. A scan is abandoned
@@ -71,6 +78,9 @@ pub struct Params {
     /// A leg ends where the contact is further than this behind the middle of the pad: the edge of the object.
     #[param(unit = "m", above = 0.0, usual = ..=USUAL_LENGTH_M, default = 0.02)]
     edge_m: f64,
+    /// A stroke ends where the sensor is inclined by more than this to where the scan began. Without it, none does.
+    #[param(unit = "rad", range = 0.01..=1.5)]
+    max_tilt_rad: Option<f64>,
 }
 
 /// An axis of the sensor.
@@ -83,11 +93,19 @@ enum StrokeAxis {
 }
 
 impl StrokeAxis {
-    /// Exchanges x and y of the sensor with along and across the strokes, either way.
-    fn order<T>(self, [x, y]: [T; 2]) -> [T; 2] {
+    /// Returns the direction across the strokes in the sensor's x and y, where the scan begins.
+    const fn across(self) -> [f64; 2] {
         match self {
-            Self::X => [x, y],
-            Self::Y => [y, x],
+            Self::X => [0.0, 1.0],
+            Self::Y => [1.0, 0.0],
+        }
+    }
+
+    /// Returns the direction along the strokes for one across them.
+    const fn along(self, [x, y]: [f64; 2]) -> [f64; 2] {
+        match self {
+            Self::X => [y, -x],
+            Self::Y => [-y, x],
         }
     }
 }
@@ -100,10 +118,10 @@ pub struct Inputs<'a> {
     /// Pose of the sensor in the base, to measure distances.
     #[port(frame = "A", reference = "B", quantity = "sensor_pose", sampled)]
     pose: In<'a, Pose>,
-    /// Centre of the contact along the sensor's x, to find edges.
+    /// Centre of the contact along the sensor's x, to find edges. Without a wire it counts as 0.
     #[port(unit = "m", frame = "A", quantity = "x", optional, sampled)]
     x: Option<In<'a, Scalar>>,
-    /// Centre of the contact along the sensor's y, to find edges.
+    /// Centre of the contact along the sensor's y, to find edges. Without a wire it counts as 0.
     #[port(unit = "m", frame = "A", quantity = "y", optional, sampled)]
     y: Option<In<'a, Scalar>>,
 }
@@ -148,12 +166,20 @@ impl Node for ScanGuide {
             state.scan = None;
         }
         if *inputs.gate && speed > 0.0 {
-            let contact = [inputs.x.map(|x| *x), inputs.y.map(|y| *y)];
             let scan = state.scan.get_or_insert_with(|| Scan::new(&self.params));
-            let step = scan.odometer.step(&inputs.pose);
-            scan.advance(&self.params, axis.order(step), axis.order(contact), tick);
+            let across = scan.planes.across(&inputs.pose, axis.across());
+            let along = axis.along(across);
+            let turned = |at: [f64; 2]| [along, across].map(|side| side[0] * at[0] + side[1] * at[1]);
+            let moved = Moved {
+                step: turned(scan.odometer.step(&inputs.pose)),
+                tilt: scan.inclination.of(&inputs.pose),
+                contact: (inputs.x.is_some() || inputs.y.is_some())
+                    .then(|| turned([&inputs.x, &inputs.y].map(|at| at.as_ref().map_or(0.0, |at| **at)))),
+            };
+            scan.advance(&self.params, moved, tick);
             if let Some(leg) = scan.leg {
-                let [x, y] = axis.order(leg.velocity(speed));
+                let [u, v] = leg.velocity(speed);
+                let [x, y] = [0, 1].map(|i| along[i] * u + across[i] * v);
                 out.twist.set(Twist([x, y, 0.0, 0.0, 0.0, 0.0].into()));
             }
         }

@@ -1,28 +1,31 @@
 //! A scan in progress: where it is, and the legs that it consists of.
 //!
-//! The distance that the sensor has moved is summed along its own axes, u along the strokes and v across them:
+//! The distance that the sensor has moved is summed in its own plane, u along the strokes and v across them:
 //!
 //! ```text
-//! (u, v) += R' (p - p_last)          p, R the position and the axes of the sensor in the base
+//! (u, v) += (a, b)' R' (p - p_last)  p, R the position and the axes of the sensor in the base
 //! ```
 //!
-//! On a curved surface this is the distance along the surface. The scan is centred on its start. With n strokes of
+//! b is the direction of the normal of the rows' planes in the plane of the sensor, and a is at right angles to it: along
+//! a, the sensor stays in its plane. On a curved surface this is the distance along the surface. The scan is centred on its start. With n strokes of
 //! length L and steps of width B, the sensor moves across to v = -(n - 1) B / 2, along to u = -L / 2, and then makes n
 //! strokes between u = -L / 2 and L / 2 with a step across by B between two strokes.
 //!
 //! A leg ends early at the edge of the object: where the contact has fallen back on the pad, against the motion, or
-//! where the sensor makes no progress.
+//! where the sensor makes no progress. With a largest tilt it also ends where the surface is too steep.
 
 use tactflow_runtime::node::Tick;
 
 use super::{Params, StrokeAxis};
-use crate::motion::travel::{Odometer, Stall};
+use crate::motion::travel::{Inclination, Odometer, Planes, Stall};
 
 /// A scan in progress.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Scan {
     pub(super) axis: StrokeAxis,
     pub(super) odometer: Odometer,
+    pub(super) inclination: Inclination,
+    pub(super) planes: Planes,
     /// Position along the strokes and across, from the start [m].
     at: [f64; 2],
     /// Number of the leg: 0 across to the first row, 1 to its beginning, then strokes (even) and steps across (odd).
@@ -32,6 +35,23 @@ pub(super) struct Scan {
     stall: Stall,
     /// Since when the contact has been too far behind the middle of the pad [ns].
     edge_since: Option<i64>,
+    /// The inclination at the start of the leg [rad].
+    start_tilt: Option<f64>,
+    /// Whether the surface was flat enough somewhere on this leg.
+    was_flat: bool,
+    /// Whether a stroke has been on a surface that is flat enough.
+    has_scanned: bool,
+}
+
+/// What a sensor has done since the last sample, along the strokes and across.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Moved {
+    /// Its step [m].
+    pub(super) step: [f64; 2],
+    /// Its inclination to where the scan began [rad].
+    pub(super) tilt: f64,
+    /// Where the contact is on the pad [m], if that is known.
+    pub(super) contact: Option<[f64; 2]>,
 }
 
 /// A straight part of the scan, with its ends [m].
@@ -55,31 +75,58 @@ impl Scan {
         Self {
             axis: params.axis,
             odometer: Odometer::default(),
+            inclination: Inclination::default(),
+            planes: Planes::default(),
             at: [0.0; 2],
             number,
             leg: Leg::new(params, number, [0.0; 2]),
             stall: Stall::default(),
             edge_since: None,
+            start_tilt: None,
+            was_flat: false,
+            has_scanned: false,
         }
     }
 
     /// Adds a step, and begins the next leg where this one ends.
-    pub(super) fn advance(&mut self, params: &Params, step: [f64; 2], contact: [Option<f64>; 2], tick: &Tick) {
+    pub(super) fn advance(&mut self, params: &Params, moved: Moved, tick: &Tick) {
         let Some(leg) = self.leg else { return };
+        let Moved { step, tilt, contact } = moved;
         for (at, step) in self.at.iter_mut().zip(step) {
             *at += step;
         }
         let at = self.at[leg.side];
         let is_at_end = (leg.to - at) * leg.sign() <= 0.0;
-        let is_edge = self.is_edge(contact[leg.side].is_some_and(|place| place * leg.sign() < -params.edge_m), tick);
+        let is_edge = self.is_edge(contact.is_some_and(|at| at[leg.side] * leg.sign() < -params.edge_m), tick);
         let way = (at - leg.from) * leg.sign();
-        if !is_at_end && !is_edge && !self.stall.is_stuck(way, params.speed_m_per_s, tick) {
+        let is_steep = self.is_steep(params, leg, way, tilt);
+        if !is_at_end && !is_edge && !is_steep && !self.stall.is_stuck(way, params.speed_m_per_s, tick) {
             return;
         }
-        let is_surface_end = self.number > FIRST_STROKE && leg.side == 1 && (at - leg.from) < 0.5 * params.step_m;
+        self.leg = if self.is_surface_end(params, leg) { None } else { Leg::new(params, self.number + 1, self.at) };
         self.number += 1;
-        self.leg = if is_surface_end { None } else { Leg::new(params, self.number, self.at) };
-        (self.stall, self.edge_since) = (Stall::default(), None);
+        (self.stall, self.edge_since, self.start_tilt, self.was_flat) = Default::default();
+    }
+
+    /// Returns whether a leg ends because the surface is too steep. A leg that begins on a steep surface ends only where
+    /// it has become steeper, and not within two steps: the sensor still rolls on after the turn. A step across is short,
+    /// and leads to a row that may be flatter.
+    fn is_steep(&mut self, params: &Params, leg: Leg, way: f64, tilt: f64) -> bool {
+        let Some(max) = params.max_tilt_rad.filter(|_| leg.side == 0 || self.number == 0) else { return false };
+        let start = *self.start_tilt.get_or_insert(tilt);
+        self.was_flat |= tilt <= max;
+        tilt > max && (self.was_flat || tilt > start && way > 2.0 * params.step_m)
+    }
+
+    /// Returns whether the surface ends with a leg: a step across that got nowhere, or a stroke that was too steep
+    /// everywhere, after one that was not.
+    fn is_surface_end(&mut self, params: &Params, leg: Leg) -> bool {
+        if leg.side == 1 {
+            return self.number > FIRST_STROKE && self.at[1] - leg.from < 0.5 * params.step_m;
+        }
+        let (is_flat, had_scanned) = (params.max_tilt_rad.is_none() || self.was_flat, self.has_scanned);
+        self.has_scanned |= is_flat && self.number >= FIRST_STROKE;
+        had_scanned && !is_flat
     }
 
     /// Returns whether the contact has been behind for long enough.
