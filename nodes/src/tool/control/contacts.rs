@@ -88,6 +88,11 @@ impl Answer {
 }
 
 impl Contact {
+    /// Returns whether the bench says how a feature answers.
+    pub(crate) fn states(&self, feature: &str) -> bool {
+        self.features.contains_key(feature)
+    }
+
     /// Returns how a feature answers: as the bench says, or else by geometry.
     pub(crate) fn answer(&self, feature: &str) -> Option<Answer> {
         self.features.get(feature).copied().or_else(|| Answer::of_geometry(feature))
