@@ -152,7 +152,7 @@ fn the_bandwidth_is_the_one_of_a_step() {
     ] {
         let (ran, explained) = (bandwidth(&one.run()), one.explained("bandwidth_hz"));
         let Step { task, bench, feature, .. } = one;
-        assert!((ran / explained - 1.0).abs() < 0.2, "{task}, {bench}, {feature}: {ran} Hz, explained {explained} Hz");
+        assert!((explained / ran - 1.0).abs() < 0.2, "{task}, {bench}, {feature}: {ran} Hz, explained {explained} Hz");
     }
 }
 

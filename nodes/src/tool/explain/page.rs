@@ -157,8 +157,8 @@ fn loops(loops: &[Stability], style: &Style) -> String {
     if loops.iter().any(|one| one.by_geometry && one.margins.is_some()) {
         let _ = writeln!(
             text,
-            "{GEOMETRY}: the bench says nothing of this feature. Without the resonance of the arm, so that its margins are smaller,\n\
-             and a contact that sticks can follow later. `tactflow tune` measures it."
+            "{GEOMETRY}: the bench states neither resonance nor latency of this feature. Its margins leave out the arm and are\n\
+             too large, and a contact that sticks follows later. `tactflow tune` measures it."
         );
     }
     let found = loops.iter().filter_map(|one| Some((one, one.margins.as_ref()?)));

@@ -30,7 +30,7 @@ pub(super) fn stability(declared: &[Contact], law: &Law, period: f64) -> Vec<Sta
         controlled.iter().map(|feature| Stability {
             object: Some(contact.object.clone()).filter(|object| !object.is_empty()),
             feature: feature.name.clone(),
-            by_geometry: !feature.quantity().is_some_and(|quantity| contact.states(quantity)),
+            by_geometry: feature.quantity().is_some_and(|quantity| contact.is_by_geometry(quantity)),
             margins: Loop::over(feature, contact, period).map(|around| margins(&around)),
         })
     });
