@@ -48,7 +48,7 @@ fn of_loop(task: &str, bench: &str, feature: &str, key: &str) -> f64 {
 #[test]
 fn the_lag_behind_a_ramp_is_the_one_that_explain_prints() {
     // Along y the arm is soft, and the contact sticks to the foam and slips: the lag is then larger.
-    for (task, bench) in [("hybrid", "ball"), ("hybrid", "pen"), ("position", "ball")] {
+    for (task, bench) in [("hybrid", "ball"), ("hybrid", "pen"), ("position", "ball"), ("rolling", "moved_ball")] {
         let check = "[check.x]\nof = 'error.error.x'\nafter_s = 5.0\n";
         let ramp = "[[inject]]\nrole = 'pad'\nfault = 'moving'\nfrom_s = 3.0\nvelocity_m_per_s = [0.002, 0, 0]\n";
         let lag = measured(&scenario(task, bench, &format!("{check}{ramp}")), "x", "mean").abs() / 0.002;

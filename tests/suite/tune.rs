@@ -161,7 +161,7 @@ fn the_bode_plot_shows_the_margins_and_what_was_measured() {
 #[test]
 #[ignore = "it takes more than a minute: `.ci/edge` runs it"]
 fn a_loop_is_measured_on_a_simulator_that_does_not_start_again() {
-    let simulator = Peer::start("--again --seconds 90");
+    let simulator = Peer::start("--again --seconds 110");
     let address = format!("devices.bench.address=127.0.0.1:{}", simulator.port);
     let bench = ["--bench", "graphs/benches/lockstep.toml", "--set", &address];
     let said =
