@@ -75,20 +75,20 @@ pub(super) fn fit(lines: &[Line], known: impl Fn(f64) -> Complex<f64>) -> Result
     };
     let points: Vec<Point> =
         equal.iter().zip(&good).map(|(point, line)| (point.0, point.1, point.2 * heard(line))).collect();
-    let (resonance, chosen) = match (resonant(&points), resonant(&equal)) {
-        (Err(plain), Ok(faint)) => {
-            // A resonance that matters little to the loop still says what mass moves.
-            let [own, damping, _] = faint.at;
-            let kept = search(&points, [Span::log(own, own, 1), Span::log(damping, damping, 1), LATENCIES]);
-            if kept.error < SAME * plain.error { (Some([own, damping]), kept) } else { (None, plain) }
+    let ((mut chosen, mut has_resonance), (faint, is_faint)) = (choose(&points), choose(&equal));
+    if is_faint && !has_resonance {
+        // A resonance that matters little to the loop still says what mass moves.
+        let [own, damping, _] = faint.at;
+        let kept = search(&points, [Span::log(own, own, 1), Span::log(damping, damping, 1), LATENCIES]);
+        if kept.error < SAME * chosen.error {
+            (chosen, has_resonance) = (kept, true);
         }
-        (Ok(best), _) => (Some([best.at[0], best.at[1]]), best),
-        (Err(plain), Err(_)) => (None, plain),
-    };
+    }
+    let [own, damping, latency] = chosen.at;
     Ok(Fit {
         gain: chosen.gain,
-        resonance: resonance.map(|[own, damping]| (own / (2.0 * std::f64::consts::PI), damping)),
-        latency: chosen.at[2],
+        resonance: has_resonance.then_some((own / (2.0 * std::f64::consts::PI), damping)),
+        latency,
         residual: chosen.error,
         frequencies: points.len(),
     })
@@ -99,9 +99,9 @@ const LATENCIES: Span = Span::new(0.0, 0.12, 121);
 /// Ratio of the errors of two fits that explain the same [1].
 const SAME: f64 = 1.1;
 
-/// Returns the best fit with a resonance, or the best one without if a resonance hardly explains more or lies above all
-/// frequencies.
-fn resonant(points: &[Point]) -> Result<Best, Best> {
+/// Returns the best fit, and whether it has a resonance: one that hardly explains more, or that lies above all
+/// frequencies, is none.
+fn choose(points: &[Point]) -> (Best, bool) {
     let top = points.last().map_or(1.0, |point| point.0);
     let mut best = search(
         points,
@@ -113,7 +113,8 @@ fn resonant(points: &[Point]) -> Result<Best, Best> {
         best = search(points, near);
     }
     let plain = search(points, [Span::log(1e4, 1e4, 1), Span::log(1.0, 1.0, 1), LATENCIES]);
-    if best.error < 0.8 * plain.error && best.at[0] < 1.5 * top { Ok(best) } else { Err(plain) }
+    let has_resonance = best.error < 0.8 * plain.error && best.at[0] < 1.5 * top;
+    (if has_resonance { best } else { plain }, has_resonance)
 }
 
 /// The values of a parameter that are tried.
