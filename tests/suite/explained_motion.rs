@@ -83,12 +83,11 @@ impl Step {
         let [before, after] = self.setpoints;
         let graphs = workspace().join("graphs").display().to_string();
         let shipped = fs::read_to_string(format!("{graphs}/{}.toml", self.task)).unwrap();
-        let own = shipped
+        let own = shipped.split("\n[live]").next().unwrap_or_default();
+        let own = own
             .replace("file = \"", &format!("file = \"{graphs}/"))
             .replace("bench = \"", &format!("bench = \"{graphs}/"))
-            .replace("{ from = \"pad.pressure\" }", "0.1")
-            .replace("\n[live]", "\n[lively]");
-        let own = own.split("\n[lively]").next().unwrap();
+            .replace("{ from = \"pad.pressure\" }", "0.1");
         let (_folder, path) = in_new_folder("task.toml");
         let live = format!("error.setpoint.{} = {{ min = -2.0, max = 2.0, rate = 1e4 }}", self.feature);
         fs::write(&path, format!("{own}\n[live]\n{live}\n")).unwrap();
