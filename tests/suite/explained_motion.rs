@@ -2,7 +2,7 @@
 //! impact force of a touch.
 
 use std::collections::BTreeMap;
-use std::f64::consts::TAU;
+use std::f64::consts::{FRAC_PI_2, TAU};
 use std::fs;
 
 use serde_json::Value;
@@ -146,7 +146,7 @@ fn the_bandwidth_is_the_one_of_a_step() {
         step("force", "toy_box", "pressure", [0.10, 0.12]),
         step("rolling", "moved_ball", "pressure", [0.10, 0.12]),
         step("edge", "edge", "pressure", [0.10, 0.12]),
-        step("edge", "edge", "orientation", [1.5708, 1.6108]),
+        step("edge", "edge", "orientation", [FRAC_PI_2, FRAC_PI_2 + 0.04]),
         step("hold_without_slip", "dragged_box", "spare", [0.0, 0.3]),
     ] {
         let (ran, explained) = (bandwidth(&one.run()), one.explained("bandwidth_hz"));
