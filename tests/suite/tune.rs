@@ -6,6 +6,7 @@ use std::path::Path;
 use serde_json::Value;
 
 use crate::cli::in_new_folder;
+use crate::control_law::explained;
 use crate::lockstep::Peer;
 use crate::tool::{peer, say};
 
@@ -68,7 +69,36 @@ fn a_loop_is_measured_with_several_settings_and_the_worst_of_them_decides() {
     assert!(margins.len() == 2 && (1.2..=1.7).contains(&worst), "{margins:?}");
     let saved: toml::Table = toml::from_str(&fs::read_to_string(&bench).unwrap()).unwrap();
     assert_eq!(saved["facts"]["arm"]["contacts"].as_array().unwrap().len(), 2, "each setting has its contact");
+    // The task has the new gains, and the shipped bench states the contact of another measurement.
+    let explained = explained(&[&path, "--bench", "graphs/benches/pen.toml"]);
+    let modes = explained["motions"][0]["modes"].as_array().unwrap();
+    let servo = modes.iter().find(|mode| mode["mode"] == "servo").unwrap();
+    let far =
+        |key: &str| (servo["loops"][0]["margins"][key].as_f64().unwrap() - margins[0][key].as_f64().unwrap()).abs();
+    assert!(far("phase_deg") < 6.0 && far("gain_db") < 1.5, "{servo}: {margins:?}");
 }
+
+#[test]
+#[ignore = "it takes more than a minute: `.ci/edge` runs it"]
+fn gains_far_too_low_and_too_high_end_at_the_same_ones() {
+    // The arm is half as stiff, and the image comes 12 ms later.
+    let bench = ["--bench", "graphs/benches/toy_box.toml"];
+    let plant = ["--set", "devices.bench.stiffness=100.0", "--set", "devices.bench.latency_s=0.016"];
+    let found = [0.25, 1.5].map(|factor| {
+        let gains = [("kp", GRID_BEST * factor), ("ki", GRID_BEST * factor / 5.0)];
+        let gains = gains.map(|(key, gain)| format!("nodes.pid.gains.pressure.{key}={gain:?}"));
+        let args = ["tune", "graphs/force.toml", "--set", &gains[0], "--set", &gains[1], "--format", "json"];
+        let said = say(&[&args[..], &bench, &plant].concat());
+        assert_eq!(said.code, 0, "{}{}", said.out, said.err);
+        let tuned: Value = serde_json::from_str(&said.out).unwrap();
+        tuned["features"][0]["new"][0].as_f64().unwrap()
+    });
+    assert!(found.iter().all(|kp| (kp / GRID_BEST - 1.0).abs() < 0.2), "{found:?}, by a grid search {GRID_BEST}");
+}
+
+/// The largest gain that keeps a peak of 1.7, 9 dB and 50 deg over the box, by a grid search over the response that a
+/// program of its own has measured, with sines of up to 4.8 mm.
+const GRID_BEST: f64 = 1.1;
 
 #[test]
 fn a_picture_that_cannot_be_written_is_found_before_the_robot_moves() {
@@ -124,14 +154,14 @@ fn the_bode_plot_shows_the_margins_and_what_was_measured() {
     assert!((phase - margins["phase_deg"].as_f64().unwrap()).abs() < 1.5, "{drawn:?}: {margins}");
     let frequencies = feature["answers"][0]["fits"][0][1]["frequencies"].as_f64().unwrap();
     assert_eq!(dots, 2.0 * frequencies, "{drawn:?}");
-    assert!(far < 3.0, "a dot is {far} dB beside the fit");
+    assert!(far < 4.0, "a dot is {far} dB beside the fit");
 }
 
 /// Each run opens the simulator again, whose arm stands where the last run has left it.
 #[test]
 #[ignore = "it takes more than a minute: `.ci/edge` runs it"]
 fn a_loop_is_measured_on_a_simulator_that_does_not_start_again() {
-    let simulator = Peer::start("--again --seconds 90");
+    let simulator = Peer::start("--again --seconds 110");
     let address = format!("devices.bench.address=127.0.0.1:{}", simulator.port);
     let bench = ["--bench", "graphs/benches/lockstep.toml", "--set", &address];
     let said =

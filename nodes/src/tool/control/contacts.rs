@@ -88,6 +88,13 @@ impl Answer {
 }
 
 impl Contact {
+    /// Returns whether geometry alone says how a feature answers: the bench states neither a resonance nor a latency.
+    pub(crate) fn is_by_geometry(&self, feature: &str) -> bool {
+        let stated = self.features.get(feature);
+        let is_measured = stated.is_some_and(|answer| answer.resonance_hz.is_some() || answer.latency_ms.is_some());
+        !is_measured && Answer::of_geometry(feature).is_some()
+    }
+
     /// Returns how a feature answers: as the bench says, or else by geometry.
     pub(crate) fn answer(&self, feature: &str) -> Option<Answer> {
         self.features.get(feature).copied().or_else(|| Answer::of_geometry(feature))

@@ -93,6 +93,11 @@ impl Feature {
         self.has_gain() && self.column.iter().any(|entry| *entry != 0.0)
     }
 
+    /// Returns the name of what is measured, as a bench states it.
+    pub(crate) fn quantity(&self) -> Option<&str> {
+        self.measured.as_ref()?.rsplit('.').next()
+    }
+
     /// Returns the delay of all filters [s].
     pub(crate) fn delay(&self) -> f64 {
         self.filters.iter().map(|filter| filter.delay_s).sum()

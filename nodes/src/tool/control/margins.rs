@@ -22,10 +22,31 @@ pub(crate) struct Margins {
     pub(crate) peak_sensitivity: f64,
     /// Frequency from which on the feature follows its setpoint by less than 71 % [Hz].
     pub(crate) bandwidth_hz: Option<f64>,
+    /// Where the bandwidth lies if a feature follows by up to 15 % more or less than computed [Hz]: far apart where the
+    /// feature follows by about 71 % over many frequencies.
+    pub(crate) bandwidth_range_hz: Option<[f64; 2]>,
     /// Error of the feature for a steady motion of one unit in each second [s].
     pub(crate) ramp_lag_s: f64,
     /// Standard deviation of the feature for one of white noise in the measurement [1].
     pub(crate) noise: f64,
+}
+
+/// Share of a setpoint that is followed at the bandwidth [1].
+const HALF_POWER: f64 = std::f64::consts::FRAC_1_SQRT_2;
+/// Part of this share that a response may differ from the computed one [1].
+const UNSURE: f64 = 0.15;
+/// Ratio of the ends of a bandwidth from which on it is no number: that of a first-order loop is 1.9 [1].
+const WIDE: f64 = 2.0;
+
+impl Margins {
+    /// Returns the bandwidth as text: a range where it is no number.
+    pub(crate) fn bandwidth(&self) -> String {
+        match (self.bandwidth_hz, self.bandwidth_range_hz) {
+            (Some(_), Some([low, high])) if high > WIDE * low => format!("{low:.1}-{high:.1} Hz"),
+            (Some(hz), _) => format!("{hz:.2} Hz"),
+            (None, _) => "none".to_owned(),
+        }
+    }
 }
 
 /// Number of frequencies of a sweep; two neighbours differ by a third of a percent.
@@ -60,7 +81,10 @@ fn swept(around: &Loop, frequencies: usize) -> Margins {
             .filter(|db| !is_stable || *db > 0.0)
             .reduce(f64::min),
         peak_sensitivity: open.iter().map(|(_, at)| 1.0 / (one + at).norm()).fold(1.0, f64::max),
-        bandwidth_hz: bandwidth(&open),
+        bandwidth_hz: last_passed(&open, HALF_POWER),
+        bandwidth_range_hz: first_missed(&open, HALF_POWER * (1.0 + UNSURE))
+            .zip(last_passed(&open, HALF_POWER * (1.0 - UNSURE)))
+            .map(Into::into),
         ramp_lag_s: around.ramp_lag(),
         noise: noise(&open, around.period),
     }
@@ -108,16 +132,26 @@ fn is_stable(open: &[(f64, Complex<f64>)], integrators: usize) -> bool {
     angle.abs() < PI
 }
 
-/// Returns the frequency from which on the closed loop passes less than 71 % [Hz].
-fn bandwidth(open: &[(f64, Complex<f64>)]) -> Option<f64> {
-    let passes = |at: &Complex<f64>| (at / (Complex::from(1.0) + at)).norm() >= 0.5_f64.sqrt();
-    let last = open.iter().rposition(|(_, at)| passes(at))?;
+/// Returns the share of a setpoint that the feature follows.
+fn followed(open: Complex<f64>) -> f64 {
+    (open / (Complex::from(1.0) + open)).norm()
+}
+
+/// Returns the last frequency at which the closed loop passes at least so much [Hz].
+fn last_passed(open: &[(f64, Complex<f64>)], share: f64) -> Option<f64> {
+    let last = open.iter().rposition(|(_, at)| followed(*at) >= share)?;
     Some(open[last].0 / (2.0 * PI))
+}
+
+/// Returns the first frequency at which the closed loop passes less than so much [Hz].
+fn first_missed(open: &[(f64, Complex<f64>)], share: f64) -> Option<f64> {
+    let first = open.iter().position(|(_, at)| followed(*at) < share)?;
+    Some(open[first].0 / (2.0 * PI))
 }
 
 /// Returns the standard deviation of the feature for white noise with one sample in each period [s].
 fn noise(open: &[(f64, Complex<f64>)], period: f64) -> f64 {
-    let power = |at: Complex<f64>| (at / (Complex::from(1.0) + at)).norm_sqr();
+    let power = |at: Complex<f64>| followed(at) * followed(at);
     let area = |pair: &[(f64, Complex<f64>)]| (power(pair[0].1) + power(pair[1].1)) / 2.0 * (pair[1].0 - pair[0].0);
     (open.windows(2).map(area).sum::<f64>() * period / PI).sqrt()
 }
@@ -190,6 +224,20 @@ mod tests {
         let found = integrator(share / 0.004, 0.0, 0.0, None, 0.004);
         near(Some(found.noise), (share / (2.0 - share)).sqrt(), 0.02);
         near(found.bandwidth_hz, share / 0.004 / (2.0 * PI), 0.03);
+    }
+
+    #[test]
+    fn a_bandwidth_is_a_range_where_the_response_is_flat() {
+        let plain = integrator(5.0, 0.0, 0.0, None, 0.004);
+        let hz = 5.0 / (2.0 * PI);
+        let [low, high] = plain.bandwidth_range_hz.unwrap();
+        // |T| of a first-order loop is 1 / sqrt(1 + (f / hz)^2).
+        let at = |share: f64| hz * ((0.5_f64.sqrt() * share).powi(-2) - 1.0).sqrt();
+        assert!((low / at(1.15) - 1.0).abs() < 0.03 && (high / at(0.85) - 1.0).abs() < 0.03, "{low} {high}");
+        assert!(plain.bandwidth().starts_with("0.8"), "{}", plain.bandwidth());
+        // A resonance of the arm lifts the response again where the loop has lost it.
+        let flat = integrator(3.5, 0.0, 0.0, Some((2.2, 0.3)), 0.004);
+        assert_eq!(flat.bandwidth(), "0.5-2.3 Hz", "{flat:?}");
     }
 
     #[test]

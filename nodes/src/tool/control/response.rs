@@ -26,14 +26,15 @@ pub(crate) struct Loop {
     resonance: Option<(f64, f64)>,
     latency: f64,
     pub(crate) period: f64,
+    /// What was measured, as a multiple of the model, at circular frequencies from low to high [rad/s]; empty if nothing was.
+    measured: Vec<(f64, Complex<f64>)>,
 }
 
 impl Loop {
     /// Returns the loop of a feature over a contact; `None` if neither the bench nor geometry says how the feature
     /// answers the motion of its column.
     pub(crate) fn over(feature: &Feature, contact: &Contact, period: f64) -> Option<Self> {
-        let quantity = feature.measured.as_ref()?.rsplit('.').next()?;
-        let answer = contact.answer(quantity)?;
+        let answer = contact.answer(feature.quantity()?)?;
         let latency_ms = answer.latency_ms.unwrap_or(contact.latency_ms);
         let around = Self::new(feature, &answer, latency_ms * 1e-3, period);
         (around.gain != 0.0).then_some(around)
@@ -44,13 +45,19 @@ impl Loop {
         let gain = answer.row().iter().zip(feature.column).map(|(answer, column)| answer * column).sum();
         let Feature { kp, ki, kd, .. } = *feature;
         let shapes = feature.filters.iter().map(|filter| filter.shape).collect();
-        Self { kp, ki, kd, shapes, gain, resonance: answer.resonance(), latency, period }
+        Self { kp, ki, kd, shapes, gain, resonance: answer.resonance(), latency, period, measured: Vec::new() }
     }
 
     /// Returns the same loop with all gains of the controller times a factor.
     pub(crate) fn times(&self, factor: f64) -> Self {
         let [kp, ki, kd] = [self.kp, self.ki, self.kd].map(|gain| gain * factor);
         Self { kp, ki, kd, ..self.clone() }
+    }
+
+    /// Returns the same loop as it was measured: as a multiple of the model, at circular frequencies from low to high
+    /// [rad/s].
+    pub(crate) fn measured(&self, measured: Vec<(f64, Complex<f64>)>) -> Self {
+        Self { measured, ..self.clone() }
     }
 
     /// Returns the number of poles at zero: the motion integrates, and so does `ki`.
@@ -76,7 +83,8 @@ impl Loop {
 
     /// Returns L at a circular frequency [rad/s].
     pub(crate) fn open(&self, omega: f64) -> Complex<f64> {
-        self.known(omega) * arm(omega, self.resonance) * turn(omega * self.latency) * self.gain
+        let model = self.known(omega) * arm(omega, self.resonance) * turn(omega * self.latency) * self.gain;
+        model * between(&self.measured, omega)
     }
 
     /// Returns the response of controller, travel and filters, which a graph states.
@@ -90,6 +98,19 @@ impl Loop {
         let integral = if self.ki == 0.0 { Complex::from(0.0) } else { Complex::from(self.ki * self.period) / change };
         Complex::from(self.kp) + integral + change * (self.kd / self.period)
     }
+}
+
+/// Returns a factor between the frequencies at which it is known, straight in its logarithm over that of the frequency.
+fn between(known: &[(f64, Complex<f64>)], omega: f64) -> Complex<f64> {
+    let above = known.partition_point(|(at, _)| *at < omega);
+    let Some(low) = above.checked_sub(1).map(|i| known[i]) else {
+        return known.first().map_or(Complex::from(1.0), |(_, factor)| *factor);
+    };
+    let Some(high) = known.get(above) else { return low.1 };
+    let share = libm::log(omega / low.0) / libm::log(high.0 / low.0);
+    let ratio = high.1 / low.1;
+    let norm = libm::exp(libm::log(ratio.norm()) * share);
+    low.1 * turn(-libm::atan2(ratio.im, ratio.re) * share) * norm
 }
 
 /// Returns the response of motion to a speed that is held for a period [s].
@@ -145,6 +166,18 @@ mod tests {
         let sum = |(tick, value): (usize, &f64)| turn(angle(tick)) * (value - drift * tick as f64);
         // For an error sin, and not cos.
         after.iter().enumerate().map(sum).sum::<Complex<f64>>() * Complex::new(0.0, 2.0 / samples as f64)
+    }
+
+    #[test]
+    fn a_factor_is_straight_between_its_frequencies_and_constant_beyond() {
+        let known = [(1.0, Complex::new(2.0, 0.0)), (4.0, Complex::new(0.0, 8.0))];
+        let at = |omega: f64| between(&known, omega);
+        assert!((at(0.5) - known[0].1).norm() < 1e-12 && (at(9.0) - known[1].1).norm() < 1e-12);
+        assert!((at(4.0) - known[1].1).norm() < 1e-12);
+        // In the middle of the logarithms: the mean of the phases, and the geometric mean of the norms.
+        let half = 0.5_f64.sqrt() * 4.0;
+        assert!((at(2.0) - Complex::new(half, half)).norm() < 1e-12, "{}", at(2.0));
+        assert_eq!(between(&[], 2.0), Complex::from(1.0));
     }
 
     #[test]

@@ -17,6 +17,9 @@ const HEAD: [&str; 11] = ["feature", "setpoint", "vx", "vy", "vz", "wx", "wy", "
 const LOOP_HEAD: [&str; 9] =
     ["contact", "loop", "crossover", "phase margin", "gain margin", "peak", "bandwidth", "ramp lag", "noise"];
 
+/// Marks a loop of which the bench says nothing.
+const GEOMETRY: &str = "(geometry)";
+
 /// How a page is written.
 struct Style {
     title: &'static str,
@@ -151,6 +154,13 @@ fn loops(loops: &[Stability], style: &Style) -> String {
         text += "The peak is that of the sensitivity, and the noise is the deviation of the feature for one of the measurement. Without\n\
                  limits, dry friction, hysteresis, and what one feature does to another.\n";
     }
+    if loops.iter().any(|one| one.by_geometry && one.margins.is_some()) {
+        let _ = writeln!(
+            text,
+            "{GEOMETRY}: the bench states neither resonance nor latency of this feature. Its margins leave out the arm and are\n\
+             too large, and a contact that sticks follows later. `tactflow tune` measures it."
+        );
+    }
     let found = loops.iter().filter_map(|one| Some((one, one.margins.as_ref()?)));
     let worst = found.max_by(|(_, a), (_, b)| {
         (!a.is_stable, a.peak_sensitivity)
@@ -184,13 +194,17 @@ fn margins(one: &Stability) -> Option<[String; 9]> {
     };
     let stable = |text: String| if margins.is_stable { text } else { "unstable".to_owned() };
     Some([
-        one.object.clone().unwrap_or_else(|| "(geometry)".into()),
+        match (&one.object, one.by_geometry) {
+            (Some(object), false) => object.clone(),
+            (Some(object), true) => format!("{object} {GEOMETRY}"),
+            (None, _) => GEOMETRY.to_owned(),
+        },
         one.feature.clone(),
         with(margins.crossover_hz, "Hz", 2),
         stable(with(margins.phase_deg, "deg", 0)),
         with(margins.gain_db, "dB", 1),
         stable(format!("{:.2}", margins.peak_sensitivity)),
-        stable(with(margins.bandwidth_hz, "Hz", 2)),
+        stable(margins.bandwidth()),
         stable(with(Some(margins.ramp_lag_s * 1e3), "ms", 0)),
         stable(format!("{:.3}", margins.noise)),
     ])

@@ -15,6 +15,8 @@ pub(super) struct Stability {
     /// The object that is touched; `None` where the bench declares no contact, and geometry alone says the response.
     pub(super) object: Option<String>,
     pub(super) feature: String,
+    /// Whether geometry alone says how the feature answers: without the resonance of the arm.
+    pub(super) by_geometry: bool,
     /// `None` if nothing says how the feature answers.
     pub(super) margins: Option<Margins>,
 }
@@ -28,6 +30,7 @@ pub(super) fn stability(declared: &[Contact], law: &Law, period: f64) -> Vec<Sta
         controlled.iter().map(|feature| Stability {
             object: Some(contact.object.clone()).filter(|object| !object.is_empty()),
             feature: feature.name.clone(),
+            by_geometry: feature.quantity().is_some_and(|quantity| contact.is_by_geometry(quantity)),
             margins: Loop::over(feature, contact, period).map(|around| margins(&around)),
         })
     });

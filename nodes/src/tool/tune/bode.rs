@@ -8,7 +8,7 @@ use nalgebra::Complex;
 use tactflow_runtime::cli::svg::{INK, PlotAxis, STYLES, Svg};
 
 use super::experiment::Line;
-use super::{Tuned, TunedFeature, fit};
+use super::{Tuned, TunedFeature};
 use crate::tool::control::response::Loop;
 
 /// Width of the picture [px].
@@ -124,7 +124,7 @@ fn dots(feature: &TunedFeature, i: usize, curve: &[Point]) -> Vec<Point> {
     let Some(first) = feature.answers[i].lines.first() else { return Vec::new() };
     let scale = 2.0 * feature.new.map_or(1.0, |new| new[0] / feature.old[0]);
     let all = |k: usize| feature.answers[i].lines.iter().filter_map(move |lines: &Vec<Line>| lines.get(k));
-    let is_coherent = |k: &usize| all(*k).all(|line| line.coherence >= fit::COHERENT);
+    let counts = |k: &usize| all(*k).all(Line::counts);
     let dot = |k: usize| {
         let hz = first[k].omega / (2.0 * PI);
         let open = all(k).map(|line| line.open).sum::<Complex<f64>>() * scale;
@@ -132,7 +132,7 @@ fn dots(feature: &TunedFeature, i: usize, curve: &[Point]) -> Vec<Point> {
         let near = curve.iter().min_by(|a, b| far(a).total_cmp(&far(b))).map_or(-90.0, |at| at[2]);
         point(hz, open, near)
     };
-    (0..first.len()).filter(is_coherent).map(dot).collect()
+    (0..first.len()).filter(counts).map(dot).collect()
 }
 
 /// Draws the curve and the dots of a contact, in each panel as far as its range goes.

@@ -12,18 +12,17 @@ use super::lift;
 use crate::tool::control::law::{COMPONENTS, Feature};
 use crate::tool::control::shape::turn;
 
-/// Lowest frequency of the test signal [Hz].
-const LOWEST_HZ: f64 = 0.35;
-/// Number of frequencies, each √2 times the one before.
-const FREQUENCIES: usize = 10;
+/// Frequencies of the test signal [Hz].
+const FREQUENCIES_HZ: [f64; 11] = [0.2, 0.35, 0.5, 0.7, 1.0, 1.4, 2.0, 2.8, 4.0, 5.6, 8.0];
 /// Time after the begin of the mode until the test signal begins [s].
 const BEGIN_S: f64 = 6.0;
 /// Time for the response to a frequency to become periodic [s], and at least one period.
 const SETTLING_S: f64 = 1.0;
 /// Time in which a frequency is measured [s], and at least three periods.
 const MEASURING_S: f64 = 2.0;
-/// Largest speed of the test signal [m/s], [rad/s]: ceilings of force let a pad move no faster into an object.
-const FASTEST: [f64; 2] = [0.006, 0.15];
+/// Largest speed of the test signal along each component [m/s], [rad/s]. Ceilings of force let a pad move no faster into
+/// an object. Along the object it must overcome friction.
+const FASTEST: [f64; 6] = [0.015, 0.015, 0.006, 0.3, 0.3, 0.3];
 /// Time for the approach [s].
 const APPROACH_S: f64 = 20.0;
 /// Beginning of the names of the nodes that make the test signal.
@@ -46,8 +45,7 @@ impl Sine {
     /// Returns the sines of a test signal, one after the other, for ticks of `period` [s].
     fn all(period: f64) -> Vec<Self> {
         let mut begin = (BEGIN_S / period).round() as usize;
-        let mut sine = |k: usize| {
-            let hz = LOWEST_HZ * libm::exp2(k as f64 / 2.0);
+        let mut sine = |hz: f64| {
             let ticks = (1.0 / (hz * period)).round().max(4.0) as usize;
             let periods = |seconds: f64| (seconds / (ticks as f64 * period)).ceil() as usize;
             let sine =
@@ -55,7 +53,7 @@ impl Sine {
             begin = sine.end();
             sine
         };
-        (0..FREQUENCIES).map(&mut sine).collect()
+        FREQUENCIES_HZ.map(&mut sine).into()
     }
 
     /// Returns the tick after its last one.
@@ -92,8 +90,36 @@ pub(super) struct Line {
     pub(super) omega: f64,
     /// The response around the loop: L, by the controller of the experiment.
     pub(super) open: Complex<f64>,
-    /// The share of the answer that the signal explains, from 0 to 1.
-    pub(super) coherence: f64,
+    /// Amplitude of the whole motion [m] or [rad].
+    pub(super) way: f64,
+    /// Standard deviation of the response by noise, as the periods differ, relative to the response [1].
+    pub(super) error: f64,
+}
+
+/// Largest error of a response that counts [1].
+const MAX_ERROR: f64 = 0.3;
+/// Motions that are as large, as a fraction of the largest one [1].
+const AS_LARGE: f64 = 0.8;
+
+impl Line {
+    /// Returns whether noise leaves the response known.
+    pub(super) fn counts(&self) -> bool {
+        self.error <= MAX_ERROR
+    }
+
+    /// Returns the mean of the responses of several runs to each frequency, over the runs that have moved as far as any.
+    pub(super) fn mean(runs: &[Vec<Self>]) -> Vec<Self> {
+        let of = |i: usize| {
+            let all = || runs.iter().filter_map(move |lines| lines.get(i));
+            let most = all().map(|line| line.way).fold(0.0, f64::max);
+            let far: Vec<&Self> = all().filter(|line| line.way >= AS_LARGE * most).collect();
+            let number = far.len() as f64;
+            let open = far.iter().map(|line| line.open).sum::<Complex<f64>>() / number;
+            let variance = far.iter().map(|line| (line.open.norm() * line.error).powi(2)).sum::<f64>();
+            Self { omega: far[0].omega, open, way: most, error: variance.sqrt() / number / open.norm() }
+        };
+        (0..runs.first().map_or(0, Vec::len)).map(of).collect()
+    }
 }
 
 /// What one run said.
@@ -189,7 +215,7 @@ impl Experiment<'_> {
     /// Returns the settings of a run: the signal, its way into the motion, half of the gains, and the end.
     fn settings(&self, way: f64) -> Vec<String> {
         let unit = if self.component < 3 { "m/s" } else { "rad/s" };
-        let fastest = FASTEST[self.component / 3];
+        let fastest = FASTEST[self.component];
         let mut set = lift::settings(self.outline, self.mode, self.adder, measured(self.period) + self.period);
         for (i, sine) in Sine::all(self.period).iter().enumerate() {
             let hz = 1.0 / (sine.ticks as f64 * self.period);
@@ -226,11 +252,15 @@ fn line(rows: &[[f64; 2]], sine: &Sine, period: f64) -> Line {
     let spectra: Vec<[Complex<f64>; 2]> = measured.chunks_exact(sine.ticks).map(first_harmonic).collect();
     // The noise of the measurement moves the sensor too. The mean over the periods keeps what follows the signal.
     let mean = |i: usize| spectra.iter().map(|pair| pair[i]).sum::<Complex<f64>>() / spectra.len() as f64;
-    let power = spectra.iter().map(|pair| pair[0].norm_sqr()).sum::<f64>() / spectra.len() as f64;
+    let [own, all] = [mean(0), mean(1)];
+    let omega = 2.0 * PI / (sine.ticks as f64 * period);
+    let spread = spectra.iter().map(|pair| (pair[0] - own).norm_sqr()).sum::<f64>();
+    let periods = spectra.len() as f64;
     Line {
-        omega: 2.0 * PI / (sine.ticks as f64 * period),
-        open: -mean(0) / mean(1),
-        coherence: mean(0).norm_sqr() / power,
+        omega,
+        open: -own / all,
+        way: 2.0 * all.norm() / (sine.ticks as f64 * omega),
+        error: (spread / (periods * (periods - 1.0))).sqrt() / own.norm(),
     }
 }
 

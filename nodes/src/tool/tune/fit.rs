@@ -22,8 +22,20 @@ pub(super) struct Fit {
     pub(super) frequencies: usize,
 }
 
-/// Smallest coherence of a frequency that counts.
-pub(super) const COHERENT: f64 = 0.8;
+/// Largest error of a frequency that is compared with the fit [1].
+const CLEAR: f64 = 0.1;
+
+impl Fit {
+    /// Returns what was measured as a multiple of the fit, at the frequencies that noise hardly changes. `known` is that
+    /// of the fit.
+    pub(super) fn missed(&self, lines: &[Line], known: impl Fn(f64) -> Complex<f64>) -> Vec<(f64, Complex<f64>)> {
+        let resonance = self.resonance.map(|(hz, damping)| (2.0 * std::f64::consts::PI * hz, damping));
+        let fitted = |omega: f64| known(omega) * arm(omega, resonance) * turn(omega * self.latency) * self.gain;
+        let clear = lines.iter().filter(|line| line.error <= CLEAR);
+        clear.map(|line| (line.omega, line.open / fitted(line.omega))).collect()
+    }
+}
+
 /// Smallest number of frequencies that tell a resonance from a delay.
 pub(super) const ENOUGH: usize = 5;
 
@@ -32,31 +44,46 @@ const MIN_RESONANCE: f64 = 2.0;
 /// Smallest damping ratio of an arm in contact: a sharper peak between two frequencies is a mistake of the fit [1].
 const MIN_DAMPING: f64 = 0.05;
 
+/// Part of a response that a model of one resonance leaves in any case [1].
+const MODEL_ERROR: f64 = 0.1;
+/// Gain around the loop, as a fraction of the largest one, below which a frequency hardly matters to the margins [1].
+const FAINT: f64 = 0.1;
+
 /// The answer at one frequency: circular frequency [rad/s], response and weight.
 type Point = (f64, Complex<f64>, f64);
 
-/// Fits the answers at all coherent frequencies. `known` is the response of controller, filters and travel, with the
-/// column. Returns the number of coherent frequencies if they are too few.
+/// Fits the answers at all frequencies that count. `known` is the response of controller, filters and travel, with the
+/// column. Returns the number of these frequencies if they are too few.
+///
+/// A frequency weighs more the less noise it has, the more gain the loop has there, and the further the sensor has moved:
+/// friction holds back a small motion.
 pub(super) fn fit(lines: &[Line], known: impl Fn(f64) -> Complex<f64>) -> Result<Fit, usize> {
-    let good = lines.iter().filter(|line| line.coherence >= COHERENT);
-    let points: Vec<Point> = good.map(|line| (line.omega, line.open / known(line.omega), line.coherence)).collect();
-    if points.len() < ENOUGH {
-        return Err(points.len());
+    let good: Vec<&Line> = lines.iter().filter(|line| line.counts()).collect();
+    if good.len() < ENOUGH {
+        return Err(good.len());
     }
-    let top = points.last().map_or(1.0, |point| point.0);
-    let mut best = search(
-        &points,
-        [Span::log(MIN_RESONANCE, 2.0 * top, 24), Span::log(MIN_DAMPING, 1.5, 10), Span::new(0.0, 0.08, 9)],
-    );
-    for _ in 0..8 {
-        let mut near = best.spans.map(|span| span.closer(9));
-        near[1].low = near[1].low.max(MIN_DAMPING);
-        best = search(&points, near);
+    let most = |of: fn(&Line) -> f64| good.iter().map(|line| of(line)).fold(0.0, f64::max);
+    let (loudest, furthest) = (most(|line| line.open.norm()), most(|line| line.way));
+    let certain = |line: &&Line| {
+        let weight = 1.0 / (line.error * line.error + MODEL_ERROR * MODEL_ERROR);
+        (line.omega, line.open / known(line.omega), weight)
+    };
+    let equal: Vec<Point> = good.iter().map(certain).collect();
+    let heard = |line: &Line| {
+        let norm = line.open.norm();
+        (norm / (norm + FAINT * loudest)).powi(2) * line.way / furthest
+    };
+    let points: Vec<Point> =
+        equal.iter().zip(&good).map(|(point, line)| (point.0, point.1, point.2 * heard(line))).collect();
+    let ((mut chosen, mut has_resonance), (faint, is_faint)) = (choose(&points), choose(&equal));
+    if is_faint && !has_resonance {
+        // A resonance that matters little to the loop still says what mass moves.
+        let [own, damping, _] = faint.at;
+        let kept = search(&points, [Span::log(own, own, 1), Span::log(damping, damping, 1), LATENCIES]);
+        if kept.error < SAME * chosen.error {
+            (chosen, has_resonance) = (kept, true);
+        }
     }
-    let plain = search(&points, [Span::log(1e4, 1e4, 1), Span::log(1.0, 1.0, 1), Span::new(0.0, 0.12, 121)]);
-    // A resonance that hardly explains more, or that lies above all frequencies, is none.
-    let has_resonance = best.error < 0.8 * plain.error && best.at[0] < 1.5 * top;
-    let chosen = if has_resonance { &best } else { &plain };
     let [own, damping, latency] = chosen.at;
     Ok(Fit {
         gain: chosen.gain,
@@ -65,6 +92,29 @@ pub(super) fn fit(lines: &[Line], known: impl Fn(f64) -> Complex<f64>) -> Result
         residual: chosen.error,
         frequencies: points.len(),
     })
+}
+
+/// Latencies that are tried [s].
+const LATENCIES: Span = Span::new(0.0, 0.12, 121);
+/// Ratio of the errors of two fits that explain the same [1].
+const SAME: f64 = 1.1;
+
+/// Returns the best fit, and whether it has a resonance: one that hardly explains more, or that lies above all
+/// frequencies, is none.
+fn choose(points: &[Point]) -> (Best, bool) {
+    let top = points.last().map_or(1.0, |point| point.0);
+    let mut best = search(
+        points,
+        [Span::log(MIN_RESONANCE, 2.0 * top, 24), Span::log(MIN_DAMPING, 1.5, 10), Span::new(0.0, 0.08, 9)],
+    );
+    for _ in 0..8 {
+        let mut near = best.spans.map(|span| span.closer(9));
+        near[1].low = near[1].low.max(MIN_DAMPING);
+        best = search(points, near);
+    }
+    let plain = search(points, [Span::log(1e4, 1e4, 1), Span::log(1.0, 1.0, 1), LATENCIES]);
+    let has_resonance = best.error < 0.8 * plain.error && best.at[0] < 1.5 * top;
+    (if has_resonance { best } else { plain }, has_resonance)
 }
 
 /// The values of a parameter that are tried.
@@ -161,7 +211,7 @@ mod tests {
         let mut line = |omega: f64| {
             let ideal = arm(omega, resonance) * turn(omega * latency) * gain;
             let noisy = Complex::new(random.normal(), random.normal()) * noise * ideal.norm();
-            Line { omega, open: ideal + noisy, coherence: 0.99 }
+            Line { omega, open: ideal + noisy, way: 1.0, error: noise }
         };
         omegas.map(&mut line).collect()
     }
@@ -186,9 +236,9 @@ mod tests {
     }
 
     #[test]
-    fn noise_without_coherence_is_no_answer() {
+    fn noise_is_no_answer() {
         let mut lines = lines(2.0, None, 0.0, 0.0);
-        lines.iter_mut().skip(ENOUGH - 1).for_each(|line| line.coherence = 0.5);
+        lines.iter_mut().skip(ENOUGH - 1).for_each(|line| line.error = 0.5);
         assert_eq!(fit(&lines, |_| Complex::from(1.0)), Err(ENOUGH - 1));
     }
 }

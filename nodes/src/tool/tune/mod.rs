@@ -20,7 +20,7 @@ use super::arguments::{may_draw, write};
 use super::control::chain::chain;
 use super::control::choose::{Wanted, factor};
 use super::control::contacts::{Answer, Contact};
-use super::control::law::{Feature, law};
+use super::control::law::{COMPONENTS, Feature, law};
 use super::control::margins::{Margins, margins};
 use super::control::response::Loop;
 use super::control::settings::{self, Index, Nodes};
@@ -33,8 +33,8 @@ use trial::Settled;
 #[command(
     name = "tune",
     after_help = "It runs the task and moves the robot. For each feature that the mode controls, it halves the gains, moves the sensor to and
-fro with sines of 0.35 to 8 Hz, one after the other, and doubles their way until two of them agree. This takes about a
-minute for each way. All limits of the graph hold. From the answers it fits a gain, a resonance and a latency, and
+fro with sines of 0.2 to 8 Hz, one after the other, and moves further and further. This takes 75 s for each of four
+ways. All limits of the graph hold. From the answers it fits a gain, a resonance and a latency, and
 proposes the largest gains that keep the margins over all contacts. Then it runs the task with them, and compares.
 
 Examples:
@@ -317,16 +317,18 @@ fn bench_file(outline: &Outline) -> Option<PathBuf> {
 
 /// Returns the name of what a feature measures.
 fn quantity(feature: &Feature) -> String {
-    let port = feature.measured.as_deref().unwrap_or(&feature.name);
-    port.rsplit('.').next().unwrap_or(port).to_owned()
+    feature.quantity().unwrap_or(&feature.name).to_owned()
 }
 
-/// First way of a linear [m] and of an angular test signal [rad].
-const FIRST: [f64; 2] = [0.15e-3, 0.005];
-/// Number of times that the way is doubled.
-const DOUBLINGS: usize = 4;
-/// Difference of two responses that agree, as the median of all frequencies [1].
+/// Ways of a linear [m] and of an angular test signal [rad], one after the other.
+const WAYS: [[f64; 4]; 2] = [[0.3e-3, 1.2e-3, 2.4e-3, 4.8e-3], [0.01, 0.02, 0.04, 0.08]];
+/// Difference of two responses that agree, as the median over the frequencies [1].
 const AGREES: f64 = 0.2;
+/// A motion that is so many times as large as another one is larger [1].
+const FURTHER: f64 = 1.3;
+
+/// Part of the answer by geometry below which a contact sticks [1].
+const LEAST_SLIDE: f64 = 0.5;
 
 /// Part of the response that a fit may leave unexplained [1].
 const MAX_RESIDUAL: f64 = 0.3;
@@ -347,15 +349,20 @@ fn identify(experiment: &Experiment<'_>, object: &str, period: f64, shell: &Shel
                         100.0 * fit.residual
                     ));
                 }
+                Ok(fit) if sticks(&quantity(feature), component, &fit) => {
+                    found.refused = Some(format!(
+                        "friction holds the contact: it follows {:.0} % of the motion",
+                        100.0 * fit.gain.abs()
+                    ));
+                }
                 Ok(fit) => {
-                    found.fits.push((super::control::law::COMPONENTS[component], fit));
+                    found.fits.push((COMPONENTS[component], fit));
                     found.lines.push(lines);
                 }
                 Err(few) => {
                     found.refused = Some(format!(
-                        "only {few} of {} frequencies answer with a coherence of {} or more, and a fit needs {ENOUGH}",
-                        lines.len(),
-                        fit::COHERENT
+                        "only {few} of {} frequencies stand out of the noise, and a fit needs {ENOUGH}",
+                        lines.len()
                     ));
                 }
             },
@@ -368,6 +375,12 @@ fn identify(experiment: &Experiment<'_>, object: &str, period: f64, shell: &Shel
     Ok(found)
 }
 
+/// Returns whether a feature follows a motion by less than half of what geometry says, or the wrong way.
+fn sticks(quantity: &str, component: usize, fit: &Fit) -> bool {
+    let slides = Answer::of_geometry(quantity).unwrap_or_default().row()[component];
+    slides != 0.0 && fit.gain / slides < LEAST_SLIDE
+}
+
 /// Returns the response of what the graph states, at half of the gains and for one component alone.
 fn known(feature: &Feature, component: usize, period: f64) -> impl Fn(f64) -> nalgebra::Complex<f64> {
     let around = Loop::new(feature, &Answer::default(), 0.0, period).times(0.5);
@@ -375,36 +388,51 @@ fn known(feature: &Feature, component: usize, period: f64) -> impl Fn(f64) -> na
     move |omega| around.known(omega) * column
 }
 
-/// Doubles the test signal until two responses agree: friction hides a small motion, and limits spoil a large one.
+/// Moves further and further, as far as the task stays in its mode, and returns the response to the largest motions
+/// that agree. Friction hides a small motion, and gives two of them the same wrong response: no larger motion may have
+/// a larger one.
 fn agreed(experiment: &Experiment<'_>, shell: &Shell) -> Result<Result<Vec<Line>, String>, Stop> {
-    let mut last: Option<Vec<Line>> = None;
-    let mut why = "no two ways of the test signal gave the same response".to_owned();
-    for doubling in 0..=DOUBLINGS {
-        let way = FIRST[experiment.component / 3] * f64::from(1_u32 << doubling);
-        let unit = if experiment.component < 3 { "m" } else { "rad" };
+    let mut runs: Vec<Vec<Line>> = Vec::new();
+    let mut stopped = None;
+    let unit = if experiment.component < 3 { "m" } else { "rad" };
+    for way in WAYS[experiment.component / 3] {
         shell.say_beside(&format!("`{}`: a test signal of {way} {unit}", experiment.feature.name));
-        let lines = match experiment.run(way)? {
-            Answered::Lines(lines) => lines,
+        match experiment.run(way)? {
+            Answered::Lines(lines) => runs.push(lines),
             Answered::Nothing(reason) => {
-                why = format!("with a test signal of {way} {unit}, {reason}");
+                stopped = Some(format!("with a test signal of {way} {unit}, {reason}"));
                 break;
             }
             Answered::Interrupted => return Err(Stop::Interrupted),
-        };
-        if last.as_ref().is_some_and(|last| difference(last, &lines).is_some_and(|far| far < AGREES)) {
-            return Ok(Ok(lines));
         }
-        last = Some(lines);
     }
-    Ok(Err(why))
+    let agree = (1..runs.len()).rev().find(|i| difference(&runs[i - 1], &runs[*i]) < AGREES);
+    Ok(match agree {
+        Some(i) if !runs[i + 1..].iter().any(|later| loudness(&runs[i], later) > 1.0 + AGREES) => {
+            Ok(Line::mean(&runs[..=i]))
+        }
+        Some(_) => Err("friction holds the contact back: only the largest test signal moves it".into()),
+        None => Err(stopped.unwrap_or_else(|| "no two test signals gave the same response".into())),
+    })
 }
 
-/// Returns the median difference of two responses, over the frequencies where both are coherent.
-fn difference(one: &[Line], other: &[Line]) -> Option<f64> {
-    let both = one.iter().zip(other).filter(|(a, b)| a.coherence.min(b.coherence) >= fit::COHERENT);
-    let mut far: Vec<f64> = both.map(|(a, b)| (a.open - b.open).norm() / b.open.norm()).collect();
-    far.sort_by(f64::total_cmp);
-    far.get(far.len() / 2).copied().filter(|_| far.len() >= ENOUGH)
+/// Returns the median difference of two responses, over the frequencies where the second motion was larger.
+fn difference(one: &[Line], other: &[Line]) -> f64 {
+    let far = |a: &Line, b: &Line| (a.open - b.open).norm() / a.open.norm().max(b.open.norm());
+    further(one, other, far).unwrap_or(0.0)
+}
+
+/// Returns the second response as a multiple of the first one, over the same frequencies.
+fn loudness(one: &[Line], other: &[Line]) -> f64 {
+    further(one, other, |a, b| b.open.norm() / a.open.norm()).unwrap_or(1.0)
+}
+
+/// Returns the median of a number of two responses, over the frequencies where the second motion was larger.
+fn further(one: &[Line], other: &[Line], of: impl Fn(&Line, &Line) -> f64) -> Option<f64> {
+    let larger = one.iter().zip(other).filter(|(a, b)| b.way >= FURTHER * a.way && a.counts() && b.counts());
+    let mut found: Vec<f64> = larger.map(|(a, b)| of(a, b)).collect();
+    found.sort_by(f64::total_cmp);
+    found.get(found.len() / 2).copied()
 }
 
 /// Returns the answer of a feature to all components. The resonance and the latency are those of the first one.
@@ -423,7 +451,7 @@ fn answer(quantity: &str, fits: &[(&'static str, Fit)]) -> Answer {
             "wy" => &mut answer.wy,
             _ => &mut answer.wz,
         };
-        let index = super::control::law::COMPONENTS.iter().position(|name| name == component);
+        let index = COMPONENTS.iter().position(|name| name == component);
         let slides = index.map_or(0.0, |i| geometry[i]);
         *entry = Some(if slides.abs() > fit.gain.abs() { slides } else { page::rounded(fit.gain) });
     }
@@ -440,7 +468,15 @@ fn propose(feature: Feature, answers: Vec<Found>, contacts: &[Contact], wanted: 
     let loops = contacts.iter().enumerate();
     let loops: Vec<(usize, Loop)> =
         loops.filter_map(|(i, contact)| Some((i, Loop::over(&feature, contact, period)?))).collect();
-    let each: Vec<Loop> = loops.iter().map(|(_, around)| around.clone()).collect();
+    // A fit smooths what friction does near the crossover, so the margins must hold for the measured response too.
+    let measured = |(i, around): &(usize, Loop)| match (&answers[*i].fits[..], &answers[*i].lines[..]) {
+        ([(component, fit)], [lines]) => {
+            let component = COMPONENTS.iter().position(|name| name == component)?;
+            Some(around.measured(fit.missed(lines, known(&feature, component, period))))
+        }
+        _ => None,
+    };
+    let each: Vec<Loop> = loops.iter().filter_map(measured).chain(loops.iter().map(|(_, one)| one.clone())).collect();
     let factor = factor(&each, wanted).filter(|_| is_measured && loops.len() == contacts.len());
     // Rounded down, so that the margins hold.
     let factor = factor.map(|factor| page::rounded_down(feature.kp * factor) / feature.kp);

@@ -68,7 +68,7 @@ fn gains(feature: &TunedFeature) -> String {
             with(margins.phase_deg, "deg", 0),
             with(margins.gain_db, "dB", 1),
             format!("{:.2}", margins.peak_sensitivity),
-            with(margins.bandwidth_hz, "Hz", 2),
+            margins.bandwidth(),
         ]
     });
     let rows: Vec<[String; 6]> = [MARGINS.map(str::to_owned)].into_iter().chain(rows).collect();
