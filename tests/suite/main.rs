@@ -90,7 +90,7 @@ mod sim;
 mod situations;
 mod slow;
 #[cfg(unix)]
-mod socket;
+pub(crate) mod socket;
 #[cfg(target_os = "linux")]
 mod stream;
 mod svg;

@@ -1,5 +1,7 @@
 //! Devices over ROS 2 against CycloneDDS in another process, `tests/peers/ros2/robot.py`: docs/ros2.md.
 
+mod shown;
+
 use std::fs;
 use std::io::Write;
 use std::process::{Child, Command, Stdio};

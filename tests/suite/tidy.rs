@@ -128,6 +128,7 @@ fn only_the_edge_names_tokio() {
     let edge = [
         "runtime/src/device/live.rs",
         "runtime/src/engine/session/caught.rs",
+        "runtime/src/socket/follower.rs",
         "runtime/src/socket/hub.rs",
         "runtime/src/socket/lines.rs",
         "runtime/src/socket/server.rs",

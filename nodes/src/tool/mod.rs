@@ -13,6 +13,8 @@ mod new;
 mod pads;
 mod pose;
 mod press;
+#[cfg(all(feature = "ros2", unix))]
+mod ros2;
 #[cfg(feature = "process")]
 mod signature;
 #[cfg(feature = "drivers")]
@@ -41,5 +43,7 @@ pub fn tool(catalogue: Catalogue) -> Tool {
     let tool = tool.command(derived(pads::run)).command(derived(sniff::run));
     #[cfg(feature = "process")]
     let tool = tool.command(derived(signature::run));
+    #[cfg(all(feature = "ros2", unix))]
+    let tool = tool.command(derived(ros2::run));
     tool
 }
