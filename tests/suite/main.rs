@@ -44,6 +44,7 @@ mod freshness;
 mod fuzz;
 #[cfg(target_os = "linux")]
 mod growth;
+mod guided;
 mod keep_out;
 mod layers;
 mod leases;
