@@ -110,7 +110,7 @@ class _Image(_Kind):
 
     def __call__(self, unit: str, rows: int, cols: int, pitch: Tuple[float, float], doc: str = "") -> Port:
         """An image as an output: with its size, and with the distance between two tactels along x and y [m]."""
-        return Port("image", unit=unit, rows=rows, cols=cols, pitch=pitch, doc=doc)
+        return Port(self.kind, unit=unit, rows=rows, cols=cols, pitch=pitch, doc=doc)
 
 
 class _Features:
@@ -121,8 +121,8 @@ class _Features:
 
 Image = _Image("image")
 """An image of a pad. An input is ``Image["N"]``, and an output ``Image("N", 16, 16, (0.005, 0.005))``."""
-VectorImage = _Kind("vector_image")
-"""A vector image of a pad with three axes, as an input: ``VectorImage["N"]``. Its cells have the axes row, column, [x, y, z]."""
+VectorImage = _Image("vector_image")
+"""A vector image of a pad with three axes, written as an image. Its cells have the axes row, column, [x, y, z]."""
 Features = _Features()
 """Features: an input is ``Features()``, and an output ``Features(x="m")``. Values are dictionaries; an absent one is None."""
 
@@ -296,9 +296,10 @@ def _value_bytes(name: str, port: Port, value: Any) -> bytes:
         packed = [struct.pack("<Bd", part is not None, 0.0 if part is None else float(part)) for part in parts]
         return b"\1" + struct.pack("<I", len(parts)) + b"".join(packed)
     cells = np.ascontiguousarray(getattr(value, "cells", value), dtype="<f4")
-    if cells.shape != (port.rows, port.cols):
-        raise ValueError(f"output `{name}` has the shape {cells.shape}, and the signature states {(port.rows, port.cols)}")
-    return b"\1" + struct.pack("<II", *cells.shape) + cells.tobytes()
+    shape = (port.rows, port.cols) if port.kind == "image" else (port.rows, port.cols, 3)
+    if cells.shape != shape:
+        raise ValueError(f"output `{name}` has the shape {cells.shape}, and the signature states {shape}")
+    return b"\1" + struct.pack("<II", *cells.shape[:2]) + cells.tobytes()
 
 
 def _frame(number: int, stamp: int, body: bytes) -> bytes:
@@ -474,11 +475,16 @@ def pad(
     cols: int,
     pitch: Tuple[float, float],
     doc: str = "",
+    axes: int = 1,
 ) -> None:
-    """Runs a pad: sends each array of ``frames``. A pair is a time of the sensor's own clock [ns] and an array."""
-    port = Image(unit, rows, cols, pitch)
-    outputs = {"image": port}
-    signature = {"tactflow": VERSION, "name": name, "doc": doc, "inputs": [], "outputs": [port.describe("image")]}
+    """Runs a pad: sends each array of ``frames``. A pair is a time of the sensor's own clock [ns] and an array.
+    With ``axes=3``, arrays have a third axis: x, y and z of each tactel, and z is positive where an object presses."""
+    if axes not in (1, 3):
+        raise ValueError(f"a pad has 1 or 3 axes, and not {axes}")
+    output = "image" if axes == 1 else "vectors"
+    port = (Image if axes == 1 else VectorImage)(unit, rows, cols, pitch)
+    outputs = {output: port}
+    signature = {"tactflow": VERSION, "name": name, "doc": doc, "inputs": [], "outputs": [port.describe(output)]}
     pipe = _take_standard_output()
     if _start(pipe, signature) is None:
         return
@@ -486,7 +492,7 @@ def pad(
     try:
         for number, frame in enumerate(frames, start=1):
             stamp, cells = frame if isinstance(frame, tuple) else (_NO_CLOCK, frame)
-            _write(pipe, _frame(number, stamp, _outputs(outputs, {"image": cells})))
+            _write(pipe, _frame(number, stamp, _outputs(outputs, {output: cells})))
     except (BrokenPipeError, KeyboardInterrupt):
         pass
 

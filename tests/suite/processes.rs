@@ -8,7 +8,7 @@ use std::time::{Duration, Instant};
 
 use tactflow_runtime::engine::{Engine, RunOptions, run};
 use tactflow_runtime::graph::{Request, compile};
-use tactflow_runtime::signal::Freshness;
+use tactflow_runtime::signal::{Freshness, Image, VectorImage};
 use tactflow_tests::{catalogue, workspace};
 
 use crate::cli::in_new_folder;
@@ -338,6 +338,78 @@ fn the_python_package_states_runs_and_reads() {
     let in_run: f64 = in_run.out.trim().parse().unwrap();
     let is_there = |pressure: &f64| (pressure - in_run).abs() < 1e-5 * in_run;
     assert!(pressures.iter().rev().take(3).any(is_there), "{in_run} N/tactel, and {pressures:?}");
+    drop(folder);
+}
+
+/// A pad with three axes, and a node that turns its drag around.
+const THREE_AXES: &str = r#"
+import time
+import numpy as np
+import tactflow
+from tactflow import VectorImage, node
+
+
+@node
+def turn(vectors: VectorImage["N"]) -> {"turned": VectorImage("N", 2, 3, (0.004, 0.004))}:
+    """The drag the other way around."""
+    return vectors.cells * np.array([-1, -1, 1])
+
+
+def frames():
+    while True:
+        cells = np.arange(18, dtype=np.float32).reshape(2, 3, 3)
+        yield time.monotonic_ns(), cells
+        time.sleep(0.005)
+
+
+import sys
+if "pad" in sys.argv:
+    tactflow.pad(frames(), "skin", unit="N", rows=2, cols=3, pitch=(0.004, 0.004), axes=3)
+else:
+    tactflow.main(turn, [])
+"#;
+
+#[test]
+fn a_program_is_a_pad_with_three_axes_and_another_gives_a_vector_image() {
+    if !has_python_module("numpy") {
+        return;
+    }
+    let package = workspace().join("nodes/python");
+    let (folder, graph) = in_new_folder("graph.toml");
+    fs::write(folder.path().join("program.py"), THREE_AXES).unwrap();
+    for name in ["pad", "turn"] {
+        let out = folder.path().join(format!("{name}.node.toml"));
+        let mut stated = tool(&["signature", "--out", out.to_str().unwrap(), "--", "python3", "program.py", name]);
+        let stated = said(stated.env("PYTHONPATH", &package));
+        assert_eq!((stated.code, stated.err.as_str()), (0, ""), "{}", stated.out);
+    }
+    let command = |name: &str| {
+        let path = format!("PYTHONPATH={}", package.display());
+        format!("command = {:?}\nsignature = \"{name}.node.toml\"\n", ["env", &path, "python3", "program.py", name])
+    };
+    let text = format!(
+        "graph.clock = 'pad'\nroles.pad = 'three_axis_pad'\nbind.pad = 'skin'\n\
+         [devices.skin]\ntype = 'process'\nperiod_ms = 5.0\n{}\
+         [nodes.program]\ntype = 'process'\nin.vectors = 'pad.vectors'\n{}\
+         [nodes.normal]\ntype = 'normal_image'\nin.vectors = 'program.turned'\n",
+        command("pad"),
+        command("turn")
+    );
+    fs::write(&graph, text).unwrap();
+    let expected: Vec<f32> = (0..18u8).map(f32::from).collect();
+    let turned: Vec<[f32; 3]> = expected.chunks(3).map(|cell| [-cell[0], -cell[1], cell[2]]).collect();
+    let normal: Vec<f32> = turned.iter().map(|cell| cell[2]).collect();
+    let mut answers = 0;
+    let options = RunOptions { duration: Some(3.0), ..RunOptions::default() };
+    observe(&Request::file(graph), &options, &mut |engine| {
+        let Some(there) = engine.get::<VectorImage>("program.turned") else { return };
+        assert_eq!(there.cells(), turned);
+        assert_eq!(engine.get::<VectorImage>("pad.vectors").unwrap().cells().as_flattened(), expected);
+        assert_eq!(engine.get::<Image>("pad.image").unwrap().cells(), normal);
+        assert_eq!(engine.get::<Image>("normal.image").unwrap().cells(), normal);
+        answers += 1;
+    });
+    assert!(answers > 10, "{answers} ticks with an answer");
     drop(folder);
 }
 

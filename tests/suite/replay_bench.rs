@@ -7,6 +7,8 @@ use tactflow_tests::workspace;
 
 use crate::replay::recorded;
 use crate::tool::{Said, say};
+use crate::ur::Peer;
+use crate::ur_process::GRAPH;
 
 /// Writes a bench on a recording in the same folder: its roles, each with the device that plays it and the role that
 /// selects the device.
@@ -114,6 +116,25 @@ fn a_recording_with_several_devices_is_played_by_their_roles() {
         let text = format!("{}{}", said.out, said.err);
         assert!(words.iter().all(|word| text.contains(word)), "{text}");
     }
+}
+
+#[test]
+fn a_run_of_a_live_arm_is_a_bench_in_virtual_time() {
+    let folder = tempfile::tempdir().unwrap();
+    let graph = folder.path().join("graph.toml");
+    {
+        let peer = Peer::start(serde_json::json!({}));
+        fs::write(&graph, format!("{GRAPH}{}", peer.params(""))).unwrap();
+        recorded(folder.path(), &[graph.to_str().unwrap(), "--slow", "1", "--for", "1.5s"]);
+    }
+    let device = "type = 'replay'\nfile = 'run.mcap'\nrobot = 'builtin:ur5e.toml'\n";
+    fs::write(&graph, GRAPH.replace("type = 'ur'\n", device)).unwrap();
+    let path = folder.path().join("again.mcap");
+    let said = say(&["run", graph.to_str().unwrap(), "--slow", "1", "--record", path.to_str().unwrap()]);
+    assert_eq!((said.code, said.err.as_str()), (0, ""), "{}", said.out);
+    assert!(said.out.contains("`arm` follows no command"), "{}", said.out);
+    let same = diff(&folder.path().join("run.mcap"), &path);
+    assert!(same.code == 0, "{}{}", same.out, same.err);
 }
 
 #[test]

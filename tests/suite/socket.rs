@@ -210,7 +210,7 @@ fn garbage_is_refused_and_delays_nobody() {
         ("go", "this line is no request"),
         ("{}", "missing field `ask`"),
         (r#"{"ask":"step"}"#, "unknown variant `step`"),
-        (r#"{"ask":"tare"}"#, "`tare` has no effect while the task runs: send `stop` first"),
+        (r#"{"ask":"tare"}"#, "`tare` has no effect: the task runs: send `stop` first"),
         (r#"{"ask":"get","patern":"*"}"#, "unknown field `patern`"),
         (
             r#"{"ask":"get","pattern":"pad.imag"}"#,

@@ -77,7 +77,7 @@ fn a_graph_without_a_zero_says_so() {
     let graph = PAD.split("    [nodes.calibrate]").next().unwrap();
     let mut rig = GraphRig::new(tactflow_nodes::catalogue(), graph, vec![pad]).unwrap_or_else(|_| panic!("it loads"));
     let refused = rig.engine_mut().tare().unwrap_err();
-    assert_eq!(refused, "`tare` has no effect: no node of the graph keeps a zero");
+    assert_eq!(refused, "`tare` has no effect: no node of the graph keeps the zero of a sensor");
 }
 
 #[test]
@@ -85,7 +85,7 @@ fn a_light_touch_is_not_taken_as_a_zero() {
     let words = ["--send", "0.76s:stop", "--send", "1.5s:tare", "--for", "2.4s", "--send", "2.3s:resume", "--quiet"];
     let run = say(&[&["run", "graphs/hybrid.toml"], &words[..]].concat());
     assert!(
-        run.code == 0 && run.err.contains("`tare` is refused: `touch.calibrate`: something touches"),
+        run.code == 0 && run.err.contains("`tare` has no effect: `touch.calibrate`: something touches"),
         "{}",
         run.err
     );
@@ -103,8 +103,8 @@ fn a_task_is_tared_only_halted_and_without_a_contact_and_a_replay_has_it() {
     let run = say(&[&["run"], &args[..]].concat());
     assert_eq!(run.code, 0, "{}", run.err);
     for refused in [
-        "`tare` has no effect while the task runs: send `stop` first",
-        "`tare` is refused: `touch.calibrate`: something touches the pad, or its zero ",
+        "`tare` has no effect: the task runs: send `stop` first",
+        "`tare` has no effect: `touch.calibrate`: something touches the pad, or its zero ",
     ] {
         assert_eq!(run.err.matches(refused).count(), 1, "{}", run.err);
     }

@@ -16,7 +16,7 @@ use crate::tool::tool;
 use crate::ur::Peer;
 
 /// The last joint turns, for as long as the run lasts.
-const GRAPH: &str = "[graph]\nclock = 'arm'\nstart = 'go'\n[roles]\narm = 'bare_arm'\n[commands]\narm.velocity = 'move.velocity'\n\
+pub(crate) const GRAPH: &str = "[graph]\nclock = 'arm'\nstart = 'go'\n[roles]\narm = 'bare_arm'\n[commands]\narm.velocity = 'move.velocity'\n\
     [nodes.turn]\ntype = 'twist_source'\ntwist = [0, 0, 0, 0, 0, 0.3]\n\
     [modes.go]\nfail = { after_ms = 60000 }\n\
     [parts.move]\nfile = 'builtin:parts/bare_move.toml'\nin.twist = 'turn.twist'\nin.position = 'arm.position'\n\

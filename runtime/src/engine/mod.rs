@@ -11,7 +11,7 @@ pub use self::core::{Counters, ModeChange, Timing};
 pub use session::{
     Beginning, ChangeRequest, Changer, DisplayedPort, End, Engine, Halt, Interrupt, LateTick, LiveValue, Logged,
     Outcome, Punctuality, Rest, RunOptions, RunRequests, ScheduledChanges, TareAnswer, TaskEnd, TaskRun, TickUse,
-    ValueChange, Walk, block_io_signals, run, run_changing, run_virtual,
+    Unquiet, ValueChange, Walk, block_io_signals, run, run_changing, run_virtual,
 };
 #[cfg(feature = "mcap")]
 pub(crate) use session::{InputItem, read_port};

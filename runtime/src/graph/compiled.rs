@@ -164,6 +164,12 @@ impl Compiled {
         self.plan.devices.iter().any(|device| matches!(device.driver, Driver::Live(_)))
     }
 
+    /// Returns whether a device takes commands.
+    #[must_use]
+    pub fn moves(&self) -> bool {
+        self.plan.devices.iter().any(|device| !device.description.commands.is_empty())
+    }
+
     /// Returns the nominal time between two ticks [s].
     #[must_use]
     pub fn period(&self) -> f64 {

@@ -71,8 +71,9 @@ impl Leaf {
 impl Differences {
     /// Compares the messages of a tick in both runs. Returns whether they are the same.
     pub(super) fn add(&mut self, (tick, time): (u64, i64), runs: [&[PortMessage<'_>]; 2]) -> bool {
-        let is_same =
-            |(a, b): (&PortMessage<'_>, &PortMessage<'_>)| (a.port, a.stamp, a.data) == (b.port, b.stamp, b.data);
+        let is_same = |(a, b): (&PortMessage<'_>, &PortMessage<'_>)| {
+            (a.port, a.stamp, timeless(a.data)) == (b.port, b.stamp, timeless(b.data))
+        };
         let are_same = runs[0].len() == runs[1].len() && runs[0].iter().zip(runs[1]).all(is_same);
         let written = self.take_over(runs);
         if are_same {
@@ -82,7 +83,11 @@ impl Differences {
         for port in written {
             let [a, b] = &self.last[&port];
             let fresh = runs.map(|run| run.iter().any(|message| message.port == port));
-            if a == b && fresh[0] == fresh[1] {
+            let is_same = match (a, b) {
+                (Some((a_stamp, a)), Some((b_stamp, b))) => a_stamp == b_stamp && timeless(a) == timeless(b),
+                (a, b) => a == b,
+            };
+            if is_same && fresh[0] == fresh[1] {
                 continue;
             }
             is_equal = false;
@@ -164,6 +169,13 @@ fn compare(a: Option<&LastMessage>, b: Option<&LastMessage>, fresh: [bool; 2]) -
         }
     });
     (component, values, largest)
+}
+
+/// Returns a message without the time at its start, which is a date in a run in real time. The stamp
+/// of the message is the time of its sample in the run.
+fn timeless(data: &[u8]) -> &[u8] {
+    let Some(rest) = data.strip_prefix(b"{\"timestamp\":{") else { return data };
+    rest.iter().position(|byte| *byte == b'}').map_or(data, |end| &rest[end..])
 }
 
 /// Returns the parts of a message without its time, by name.
@@ -262,6 +274,17 @@ mod tests {
         let a = [message("p", 0, "{\"x\":0.0}")];
         assert!(differences.add((1, 0), [&a, &a]) && !differences.add((2, 1), [&a, &[]]));
         assert_eq!(differences.ports["p"].component, "freshness");
+    }
+
+    #[test]
+    fn the_day_of_a_run_is_no_difference() {
+        let [a, b, c] = [(0, 1.0), (1_700_000_000, 1.0), (0, 2.0)].map(|(day, x)| {
+            format!("{{\"timestamp\":{{\"sec\":{day},\"nsec\":4}},\"frame_id\":\"base\",\"x\":{x:?}}}")
+        });
+        let mut differences = Differences::default();
+        assert!(differences.add((1, 4), [&[message("p", 4, &a)], &[message("p", 4, &b)]]));
+        assert!(!differences.add((2, 8), [&[message("p", 4, &c)], &[message("p", 4, &b)]]));
+        assert_eq!(differences.ports["p"].component, "x");
     }
 
     #[test]

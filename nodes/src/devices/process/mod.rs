@@ -30,7 +30,7 @@ use pad::PadProcess;
 use ports::Ports;
 use session::signature_command;
 pub(crate) use session::{ask_signature, in_shell};
-use signature::Signature;
+use signature::{PadShape, Signature};
 use stepped::InLockstep;
 
 /// Parameters of `process`.
@@ -97,7 +97,8 @@ impl Param for SignatureFile {
 /// answer is there one tick later at the earliest.
 ///
 /// **As a pad.** In a bench, a program without inputs whose only output is the image `image` fills the role
-/// `tactile_pad`. A program is never an arm: nothing outside of it would stop the motion when it hangs.
+/// `tactile_pad`. One whose only output is the vector image `vectors` fills the role `three_axis_pad`; its z is the image.
+/// A program is never an arm: nothing outside of it would stop the motion when it hangs.
 ///
 /// **What goes wrong.** A program that ends, hangs, writes anything but frames, answers with another size or states
 /// another signature than the file has failed, and the policy `device` decides. With `restart = true` in the block of a
@@ -173,8 +174,12 @@ fn open_node(params: &Params, launch: &Arc<Launch>) -> Result<Opened, Mistakes> 
 }
 
 fn open_pad(params: &Params, launch: &Arc<Launch>) -> Result<Opened, Mistakes> {
-    let Some(shape) = launch.signature.pad() else {
-        let message = format!("`{}` is no pad: a pad has the image `image`, and no other port", launch.signature.name);
+    let Some(PadShape { image: shape, has_three_axes }) = launch.signature.pad() else {
+        let name = &launch.signature.name;
+        let message = format!(
+            "`{name}` is no pad: a pad has the image `image`, or with three axes the vector image `vectors`, and no other \
+             port"
+        );
         let help = "a program is never an arm: nothing outside of it would stop the motion when it hangs";
         return Err(Mistake::param("signature", message).help(help).into());
     };
@@ -186,8 +191,13 @@ fn open_pad(params: &Params, launch: &Arc<Launch>) -> Result<Opened, Mistakes> {
     let fact = |value: f64, unit: Unit| toml::Value::from(format!("{value} {unit}"));
     facts.extend(params.threshold.map(|value| ("threshold".into(), fact(value, shape.unit))));
     facts.extend(params.pressure.map(|value| ("pressure".into(), fact(value, shape.unit.per_tactel()))));
-    let image = pads::fill(description.fills(pads::ROLE), shape, facts);
-    let driver = Driver::Live(Box::new(PadProcess::new(Arc::clone(launch), image)));
+    let (image, vectors) = if has_three_axes {
+        let (image, vectors) = pads::fill_three_axes(description.fills(pads::THREE_AXES), shape, facts);
+        (image, Some(vectors))
+    } else {
+        (pads::fill(description.fills(pads::ROLE), shape, facts), None)
+    };
+    let driver = Driver::Live(Box::new(PadProcess::new(Arc::clone(launch), image, vectors)));
     Ok(Opened { description, driver })
 }
 

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use async_trait::async_trait;
 use tactflow_runtime::device::{DeviceError, Link, Live, Output};
-use tactflow_runtime::signal::Image;
+use tactflow_runtime::signal::{Image, VectorImage};
 
 use super::child::Received;
 use super::launch::Launch;
@@ -21,21 +21,32 @@ const MAX_SKIPPED: usize = 1000;
 pub(super) struct PadProcess {
     launch: Arc<Launch>,
     image: Output<Image>,
+    /// Of a pad with three axes.
+    vectors: Option<Output<VectorImage>>,
 }
 
 impl PadProcess {
-    pub(super) const fn new(launch: Arc<Launch>, image: Output<Image>) -> Self {
-        Self { launch, image }
+    pub(super) const fn new(launch: Arc<Launch>, image: Output<Image>, vectors: Option<Output<VectorImage>>) -> Self {
+        Self { launch, image, vectors }
     }
 
     fn publish(&self, frame: &Frame, link: &mut Link) -> Result<(), String> {
         let values = wire::values(frame, &self.launch.signature)?;
         let stamp = if frame.stamp == NO_CLOCK { link.arrival() } else { link.stamp_of(frame.stamp) };
-        link.publish(|samples| match &values[..] {
-            [Value::Image(cells)] => {
-                samples.write(self.image, stamp, frame.number).cells_mut().copy_from_slice(cells);
+        let number = frame.number;
+        link.publish(|samples| match (&values[..], self.vectors) {
+            ([Value::Image(cells)], None) => {
+                samples.write(self.image, stamp, number).cells_mut().copy_from_slice(cells);
             }
-            _ => samples.clear(self.image, stamp, frame.number),
+            ([Value::VectorImage(cells)], Some(vectors)) => {
+                samples.write(vectors, stamp, number).cells_mut().copy_from_slice(cells);
+                let image = samples.write(self.image, stamp, number).cells_mut();
+                image.iter_mut().zip(cells).for_each(|(normal, [_, _, z])| *normal = *z);
+            }
+            (_, vectors) => {
+                samples.clear(self.image, stamp, number);
+                vectors.into_iter().for_each(|vectors| samples.clear(vectors, stamp, number));
+            }
         });
         Ok(())
     }

@@ -4,7 +4,7 @@ use std::borrow::Cow;
 
 use tactflow_runtime::device::{AnyReport, Commands, Description, Output, ReportAge, RoleType, Samples};
 use tactflow_runtime::node::{Need, PortSpec};
-use tactflow_runtime::signal::{Features, Flag, FlagShape, Image, Kind, Scalar, ScalarShape};
+use tactflow_runtime::signal::{Features, Flag, FlagShape, Image, Kind, Scalar, ScalarShape, VectorImage};
 
 use super::signature::{OutputShape, PortText, Signature};
 use super::wire::{Question, Value};
@@ -30,6 +30,7 @@ enum AnyOutput {
     Flag(Output<Flag>),
     Features(Output<Features>),
     Image(Output<Image>),
+    VectorImage(Output<VectorImage>),
 }
 
 /// Returns the type of the role that a program fills.
@@ -46,6 +47,7 @@ pub(super) fn role(signature: &Signature) -> RoleType {
             OutputShape::Flag => (Kind::Flag, String::new()),
             OutputShape::Features(_) => (Kind::Features, "_".to_owned()),
             OutputShape::Image(shape) => (Kind::Image, shape.unit.to_string()),
+            OutputShape::VectorImage(shape) => (Kind::VectorImage, shape.0.unit.to_string()),
         };
         // Outputs are in the frame of the first input.
         spec(port, kind, unit, "A".to_owned())
@@ -86,6 +88,7 @@ impl Ports {
                 OutputShape::Flag => AnyOutput::Flag(role.output(name, FlagShape)),
                 OutputShape::Features(shape) => AnyOutput::Features(role.output(name, shape)),
                 OutputShape::Image(shape) => AnyOutput::Image(role.output(name, shape)),
+                OutputShape::VectorImage(shape) => AnyOutput::VectorImage(role.output(name, shape)),
             }
         });
         let outputs = outputs.collect();
@@ -142,10 +145,14 @@ impl Ports {
                 (AnyOutput::Image(port), Value::Image(cells)) => {
                     samples.write(*port, stamp, number).cells_mut().copy_from_slice(cells);
                 }
+                (AnyOutput::VectorImage(port), Value::VectorImage(cells)) => {
+                    samples.write(*port, stamp, number).cells_mut().copy_from_slice(cells);
+                }
                 (AnyOutput::Scalar(port), _) => samples.clear(*port, stamp, number),
                 (AnyOutput::Flag(port), _) => samples.clear(*port, stamp, number),
                 (AnyOutput::Features(port), _) => samples.clear(*port, stamp, number),
                 (AnyOutput::Image(port), _) => samples.clear(*port, stamp, number),
+                (AnyOutput::VectorImage(port), _) => samples.clear(*port, stamp, number),
             }
         }
     }

@@ -3,7 +3,7 @@
 use std::collections::BTreeSet;
 
 use serde::{Deserialize, Serialize};
-use tactflow_runtime::signal::{FeaturesShape, ImageShape, Kind, Unit};
+use tactflow_runtime::signal::{FeaturesShape, ImageShape, Kind, Unit, VectorImageShape};
 
 /// Version of the protocol.
 pub(crate) const VERSION: u32 = 1;
@@ -78,6 +78,14 @@ pub(crate) enum OutputShape {
     Flag,
     Features(FeaturesShape),
     Image(ImageShape),
+    VectorImage(VectorImageShape),
+}
+
+/// A pad that a program is: the shape of its image, and whether it has three axes.
+#[derive(Debug, Clone)]
+pub(crate) struct PadShape {
+    pub(crate) image: ImageShape,
+    pub(crate) has_three_axes: bool,
 }
 
 impl Signature {
@@ -147,13 +155,12 @@ impl Signature {
         lists.into_iter().find_map(|(what, file, now)| difference(what, &file, &now))
     }
 
-    /// Returns the shape of the image, if the program is a pad.
-    pub(crate) fn pad(&self) -> Option<ImageShape> {
-        match (&self.outputs[..], self.inputs.is_empty()) {
-            ([port], true) if port.name == "image" => match port.output() {
-                Ok(OutputShape::Image(shape)) => Some(shape),
-                _ => None,
-            },
+    /// Returns the pad that the program is, if it is one.
+    pub(crate) fn pad(&self) -> Option<PadShape> {
+        let ([port], true) = (&self.outputs[..], self.inputs.is_empty()) else { return None };
+        match (&*port.name, port.output().ok()?) {
+            ("image", OutputShape::Image(image)) => Some(PadShape { image, has_three_axes: false }),
+            ("vectors", OutputShape::VectorImage(shape)) => Some(PadShape { image: shape.0, has_three_axes: true }),
             _ => None,
         }
     }
@@ -238,29 +245,32 @@ impl PortText {
                 let units: Result<Vec<_>, String> = units.collect();
                 Ok(OutputShape::Features(FeaturesShape::new(units?)))
             }
-            "image" => {
-                has_only(&["unit", "rows", "cols", "pitch"])?;
-                let (Some(rows), Some(cols), Some(pitch)) = (self.rows, self.cols, self.pitch) else {
-                    return Err(format!("the image `{name}` needs `rows`, `cols` and `pitch`"));
-                };
-                let tactels = rows.saturating_mul(cols);
-                if !(1..=MAX_TACTELS).contains(&tactels) || !pitch.iter().all(|pitch| *pitch > 0.0 && pitch.is_finite())
-                {
-                    let message =
-                        format!("the image `{name}` has a size of {rows} by {cols}, at a pitch of {pitch:?} m");
-                    return Err(message);
-                }
-                Ok(OutputShape::Image(ImageShape { rows, cols, pitch, unit: unit()? }))
-            }
+            "image" => self.image(unit).map(OutputShape::Image),
+            "vector_image" => self.image(unit).map(|image| OutputShape::VectorImage(VectorImageShape(image))),
             "twist" | "pose" | "joints" | "jacobian" => Err(format!(
                 "output `{name}` is a {}: a program gives features, and no motion of an arm, because nothing outside of \
                  it would stop the motion when it hangs",
                 self.kind
             )),
             kind => Err(format!(
-                "the kind of output `{name}` is `{kind}`, and not one of `scalar`, `flag`, `features`, `image`"
+                "the kind of output `{name}` is `{kind}`, and not one of `scalar`, `flag`, `features`, `image`, \
+                 `vector_image`"
             )),
         }
+    }
+
+    /// Returns the shape of an image that is an output, also of one axis of a vector image.
+    fn image(&self, unit: impl FnOnce() -> Result<Unit, String>) -> Result<ImageShape, String> {
+        let name = &self.name;
+        self.has_only("output", &["unit", "rows", "cols", "pitch"])?;
+        let (Some(rows), Some(cols), Some(pitch)) = (self.rows, self.cols, self.pitch) else {
+            return Err(format!("the image `{name}` needs `rows`, `cols` and `pitch`"));
+        };
+        let tactels = rows.saturating_mul(cols);
+        if !(1..=MAX_TACTELS).contains(&tactels) || !pitch.iter().all(|pitch| *pitch > 0.0 && pitch.is_finite()) {
+            return Err(format!("the image `{name}` has a size of {rows} by {cols}, at a pitch of {pitch:?} m"));
+        }
+        Ok(ImageShape { rows, cols, pitch, unit: unit()? })
     }
 
     fn without_doc(&self) -> String {

@@ -5,6 +5,7 @@
 use std::io::{self, Read};
 
 use tactflow_runtime::device::ReportAge;
+use tactflow_runtime::signal::ImageShape;
 
 use super::signature::{OutputShape, Signature};
 
@@ -66,6 +67,7 @@ pub(super) enum Value {
     Flag(bool),
     Features(Vec<Option<f64>>),
     Image(Vec<f32>),
+    VectorImage(Vec<[f32; 3]>),
 }
 
 /// Reads a frame of at most `max` bytes. Returns `None` at the end.
@@ -129,6 +131,7 @@ pub(super) fn max_bytes(signature: &Signature) -> usize {
         OutputShape::Flag => 1,
         OutputShape::Features(shape) => 4 + 9 * shape.features.len(),
         OutputShape::Image(shape) => 8 + 4 * shape.tactels(),
+        OutputShape::VectorImage(shape) => 8 + 12 * shape.0.tactels(),
     };
     signature.outputs.iter().flat_map(|port| port.output()).map(|shape| 1 + size(&shape)).sum()
 }
@@ -176,17 +179,29 @@ fn value(rest: &mut &[u8], shape: &OutputShape) -> Result<Value, String> {
             let values: Result<Vec<_>, String> = (0..count).map(&mut component).collect();
             Value::Features(values?)
         }
-        OutputShape::Image(shape) => {
-            let (rows, cols) = (u32::from_le_bytes(take(rest)?) as usize, u32::from_le_bytes(take(rest)?) as usize);
-            if (rows, cols) != (shape.rows, shape.cols) {
-                let stated = format!("{} by {}", shape.rows, shape.cols);
-                return Err(format!("it has {rows} by {cols} tactels, and the signature states {stated}"));
-            }
-            let cells: Result<Vec<f32>, String> =
-                (0..rows * cols).map(|_| take(rest).map(f32::from_le_bytes)).collect();
-            Value::Image(cells?)
+        OutputShape::Image(shape) => Value::Image(cells(rest, shape, number)?),
+        OutputShape::VectorImage(shape) => {
+            Value::VectorImage(cells(rest, &shape.0, |rest| Ok([number(rest)?, number(rest)?, number(rest)?]))?)
         }
     })
+}
+
+/// Reads the size of an image, and its cells row by row.
+fn cells<T>(
+    rest: &mut &[u8],
+    shape: &ImageShape,
+    mut cell: impl FnMut(&mut &[u8]) -> Result<T, String>,
+) -> Result<Vec<T>, String> {
+    let (rows, cols) = (u32::from_le_bytes(take(rest)?) as usize, u32::from_le_bytes(take(rest)?) as usize);
+    if (rows, cols) != (shape.rows, shape.cols) {
+        let stated = format!("{} by {}", shape.rows, shape.cols);
+        return Err(format!("it has {rows} by {cols} tactels, and the signature states {stated}"));
+    }
+    (0..shape.tactels()).map(|_| cell(rest)).collect()
+}
+
+fn number(rest: &mut &[u8]) -> Result<f32, String> {
+    take(rest).map(f32::from_le_bytes)
 }
 
 fn take<const N: usize>(rest: &mut &[u8]) -> Result<[u8; N], String> {
@@ -202,7 +217,8 @@ mod tests {
     const SIGNATURE: &str = r#"{"tactflow":1,"name":"a","inputs":[{"name":"image","kind":"image"}],"outputs":[
         {"name":"x","kind":"scalar","unit":"m"},{"name":"is_there","kind":"flag"},
         {"name":"parts","kind":"features","features":[{"name":"a","unit":"m"},{"name":"b","unit":"N"}]},
-        {"name":"heat","kind":"image","rows":1,"cols":2,"pitch":[0.001,0.001],"unit":"N"}]}"#;
+        {"name":"heat","kind":"image","rows":1,"cols":2,"pitch":[0.001,0.001],"unit":"N"},
+        {"name":"drag","kind":"vector_image","rows":2,"cols":1,"pitch":[0.001,0.001],"unit":"N"}]}"#;
 
     /// A frame with these bytes as its body.
     fn frame(body: &[u8]) -> Vec<u8> {
@@ -221,6 +237,9 @@ mod tests {
         body.push(1);
         body.extend([1, 0, 0, 0, 2, 0, 0, 0]);
         body.extend([0.5f32, -0.5].iter().flat_map(|cell| cell.to_le_bytes()));
+        body.push(1);
+        body.extend([2, 0, 0, 0, 1, 0, 0, 0]);
+        body.extend([1f32, 2.0, 3.0, 4.0, 5.0, 6.0].iter().flat_map(|cell| cell.to_le_bytes()));
         body
     }
 
@@ -236,6 +255,7 @@ mod tests {
             Value::Flag(true),
             Value::Features(vec![Some(2.5), None]),
             Value::Image(vec![0.5, -0.5]),
+            Value::VectorImage(vec![[1.0, 2.0, 3.0], [4.0, 5.0, 6.0]]),
         ];
         assert_eq!(values(&frame, &signature).unwrap(), expected);
     }

@@ -9,6 +9,7 @@ pub(super) mod log;
 mod outside;
 mod ports;
 mod progress;
+mod reload;
 mod saved;
 mod slow;
 mod status;
@@ -26,7 +27,7 @@ use files::OutputFiles;
 use log::NodeLog;
 use outside::{Outside, changes};
 use progress::Progress;
-use saved::SavedFiles;
+use reload::{Exchange, Reload};
 use stepping::Stepping;
 use summary::Summary;
 
@@ -92,7 +93,7 @@ pub(crate) fn run(args: RunArgs, shell: &Shell) -> u8 {
 }
 
 /// The length, the words and the files of a run.
-#[derive(clap::Args, Default)]
+#[derive(clap::Args, Clone, Default)]
 pub struct JobOptions {
     /// Stop when the clock of the graph reaches this time: 20s, 500ms, 2min
     #[arg(long = "for", value_name = "TIME", value_parser = duration, allow_hyphen_values = true)]
@@ -114,8 +115,9 @@ pub struct JobOptions {
     /// time only
     #[arg(long, value_name = "TIME", num_args = 0..=1, require_equals = true, value_parser = duration)]
     pub step: Option<Option<f64>>,
-    /// Run again from the beginning when a file of the graph is saved. In virtual time only
-    #[arg(long, conflicts_with_all = ["realtime", "listen", "step"])]
+    /// Run again from the beginning when a file of the graph is saved; in real time only while the run is halted, at rest
+    /// and untouched
+    #[arg(long, conflicts_with = "step")]
     pub watch: bool,
     /// Open no socket, so that `ps`, `get`, `set`, `send` and `watch` do not reach the run; in virtual time there is none
     #[cfg(unix)]
@@ -153,11 +155,12 @@ impl JobOptions {
             let why = "a run in real time cannot pause; `stop` brings an arm to rest";
             return Err(format!("`--step` requires virtual time: {why}"));
         }
-        if self.watch && is_real {
-            let why = "another graph is not exchanged for one that moves an arm; end the run, and start it again";
-            return Err(format!("`--watch` requires virtual time: {why}"));
-        }
         Ok(())
+    }
+
+    /// Whether a graph runs in real time.
+    fn is_real(&self, plan: &Compiled) -> bool {
+        self.realtime || plan.is_live()
     }
 
     /// Returns the options of the engine.
@@ -208,31 +211,6 @@ impl Job {
         .unwrap_or_else(|message| shell.refuse(message))
     }
 
-    /// Runs the graph again each time that one of its files is saved, until a signal ends it. Returns the exit code of the
-    /// last run.
-    fn watch(&self, shell: &Shell) -> u8 {
-        let interrupt = match Interrupt::catch() {
-            Ok(interrupt) => interrupt,
-            Err(error) => return shell.refuse(format_args!("cannot run: {error}")),
-        };
-        let mut saved = SavedFiles::new(&self.request.graph);
-        loop {
-            saved.begin();
-            let code = match slow::compile(&self.request, shell, &mut |sources| saved.follow(sources)) {
-                Ok((plan, request)) => match self.run_plan(plan, &request, shell, Some(&mut saved)) {
-                    Ok(code) => code,
-                    Err(message) => return shell.refuse(message),
-                },
-                Err(code) => code,
-            };
-            if !interrupt.is_requested() && !saved.has_ended_the_run() {
-                shell.say_beside("`--watch`: waiting until a file of the graph is saved; Ctrl-C ends it");
-            }
-            let Some(path) = saved.wait(&interrupt) else { return code };
-            shell.say_beside(&format!("`{}` was saved", path.display()));
-        }
-    }
-
     /// Runs a plan and returns the exit code.
     ///
     /// # Errors
@@ -242,11 +220,11 @@ impl Job {
         plan: Compiled,
         request: &Request,
         shell: &Shell,
-        mut saved: Option<&mut SavedFiles>,
+        reload: Option<&Reload>,
     ) -> Result<u8, String> {
         plan.warnings().iter().for_each(|report| shell.show(report));
         let interrupt = Arc::new(Interrupt::catch().map_err(|error| format!("cannot run: {error}"))?);
-        let is_real = self.options.realtime || plan.is_live();
+        let is_real = self.options.is_real(&plan);
         self.options.check_time(is_real)?;
         let chosen = self.options.points.as_ref().map(|wanted| wanted.resolve(&plan)).transpose()?;
         let mut warnings = plan.warnings().into_iter().flat_map(|report| report.diagnostics);
@@ -275,7 +253,8 @@ impl Job {
         let terminal = Some(shell.err()).filter(|_| self.print != Print::Nothing);
         let mut progress = Progress::new(end, terminal, shell.has_colour_on_stderr());
         let mut options = self.options.of_run();
-        options.cancel = saved.as_ref().map(|saved| Arc::clone(&saved.end));
+        options.cancel = reload.map(|reload| Arc::clone(&reload.end));
+        let mut exchange = reload.map(Exchange::new);
         let mut stepping = Stepping::of(self.options.step, &mut options, &interrupt)?;
         let Outside { mut changes, mut socket } = Outside::open(changes, facts, &engine, &mut options, shell);
         let outcome = without_panic_messages(|| {
@@ -287,7 +266,7 @@ impl Job {
                 files.add(engine, &patience);
                 socket.iter_mut().for_each(|socket| socket.publish(engine));
                 progress.show(seconds(engine.now()), engine.ticks(), |style| summary.live(engine, style));
-                saved.iter_mut().for_each(|saved| saved.look());
+                exchange.iter_mut().for_each(|exchange| exchange.after(engine, shell));
                 if let Some(stepping) = &mut stepping {
                     let show = |words: &str| shell.say(&paused(engine, &summary, shell.has_colour(), words));
                     stepping.after(seconds(engine.now()), show);
@@ -307,7 +286,7 @@ impl Job {
         if let Ok(outcome) = &outcome {
             let style = PageStyle::new(shell.has_colour());
             self.say(shell, &format!("\n{}", summary.render(&engine, outcome, style).trim_end()));
-            self.say(shell, &ending(outcome));
+            self.say(shell, &ending(outcome, reload.is_some_and(Reload::has_ended)));
         }
         let unfinished = changes.map_or_else(Vec::new, |changes| changes.unfinished(&engine));
         let code = self.report_end(shell, &engine, outcome);
@@ -390,12 +369,13 @@ fn paused(engine: &Engine, summary: &Summary, has_colour: bool, words: &str) -> 
 }
 
 /// Describes how a run ended, and its speed.
-fn ending(outcome: &Outcome) -> String {
+fn ending(outcome: &Outcome, is_reloaded: bool) -> String {
     let interrupted = outcome.signal.map(|signal| format!("interrupted by {signal}"));
     let reason = match outcome.end {
         End::Finished => "a device has no more samples",
         End::Done => "a `done` condition ended the run",
         End::Duration => "the time limit ended the run",
+        End::Interrupted if is_reloaded && interrupted.is_none() => "ended for the saved graph",
         End::Interrupted => interrupted.as_deref().unwrap_or("interrupted"),
         End::Fault(_) => "a fault",
     };

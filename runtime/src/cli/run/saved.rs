@@ -1,10 +1,8 @@
-//! `--watch`: a run begins again when a file of its graph is saved.
+//! The files of a graph, and which of them was saved since it was read.
 
 use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread::sleep;
 use std::time::{Duration, Instant, SystemTime};
 
@@ -28,21 +26,18 @@ fn state(path: &Path) -> State {
 pub(super) struct SavedFiles {
     files: BTreeMap<PathBuf, State>,
     looked: Instant,
-    /// Ends a run whose files were saved.
-    pub(super) end: Arc<AtomicBool>,
 }
 
 impl SavedFiles {
     /// Follows the file of a graph, and each file that it turns out to read.
     pub(super) fn new(graph: &Path) -> Self {
         let files = BTreeMap::from([(graph.to_owned(), state(graph))]);
-        Self { files, looked: Instant::now(), end: Arc::default() }
+        Self { files, looked: Instant::now() }
     }
 
     /// Takes the files as they are now: they are about to be read.
     pub(super) fn begin(&mut self) {
         self.files.iter_mut().for_each(|(path, known)| *known = state(path));
-        self.end.store(false, Ordering::Relaxed);
     }
 
     /// Adds the files that a graph has read. Files that an earlier version has read stay: a mistake may hide them.
@@ -75,18 +70,6 @@ impl SavedFiles {
             }
             seen = now;
         }
-    }
-
-    /// Ends the run if a file was saved.
-    pub(super) fn look(&mut self) {
-        if self.saved().is_some() {
-            self.end.store(true, Ordering::Relaxed);
-        }
-    }
-
-    /// Whether the last run has ended because a file was saved.
-    pub(super) fn has_ended_the_run(&self) -> bool {
-        self.end.load(Ordering::Relaxed)
     }
 
     /// Waits until a file is saved. Returns `None` if a signal ends the wait.

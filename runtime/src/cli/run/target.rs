@@ -2,7 +2,7 @@
 
 use std::fs::{self, File};
 use std::io::{self, Read};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use crate::cli::shell::{Shell, standard_output};
 use crate::engine::Interrupt;
@@ -16,6 +16,18 @@ pub(crate) fn is_stdout(path: &Path) -> bool {
 /// Whether a path is a pipe or a device, whose name says nothing about the format.
 pub(crate) fn is_special(path: &Path) -> bool {
     is_stdout(path) || fs::metadata(path).is_ok_and(|file| !file.is_file() && !file.is_dir())
+}
+
+/// Returns the path of a file of the n-th run: `run-2.csv` for `run.csv`. A pipe or a device is the same for all runs.
+pub(crate) fn numbered(path: &Path, n: usize) -> PathBuf {
+    let (Some(stem), false) = (path.file_stem(), is_special(path)) else { return path.to_owned() };
+    let mut name = stem.to_owned();
+    name.push(format!("-{n}"));
+    if let Some(extension) = path.extension() {
+        name.push(".");
+        name.push(extension);
+    }
+    path.with_file_name(name)
 }
 
 /// Opens a file without removing its content, and waits for the reader of a pipe. An existing file is accepted only if

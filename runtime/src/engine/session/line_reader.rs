@@ -2,7 +2,7 @@
 
 use std::collections::VecDeque;
 use std::io::{ErrorKind, Read};
-use std::sync::{Arc, Mutex, PoisonError, TryLockError};
+use std::sync::{Arc, Mutex, PoisonError, RwLock, TryLockError};
 use std::time::Duration;
 
 /// Maximum length of a line [bytes].
@@ -26,7 +26,15 @@ pub(crate) struct Inbox {
 }
 
 /// Reads an input. The thread ends with the input or with the process.
-pub(crate) struct LineReader(Arc<Mutex<Inbox>>);
+#[derive(Clone)]
+pub(crate) struct LineReader(Arc<Shared>);
+
+/// What the reading thread and the ticks share.
+struct Shared {
+    inbox: Mutex<Inbox>,
+    /// The names of the tasks that can be stopped.
+    tasks: RwLock<Vec<String>>,
+}
 
 impl LineReader {
     /// Starts to read. A word that stops one of the tasks gets through however many others are read. `is_back_later`
@@ -39,18 +47,24 @@ impl LineReader {
         tasks: Vec<String>,
         is_back_later: impl Fn(&std::io::Error) -> bool + Send + 'static,
     ) -> std::io::Result<Self> {
-        let inbox = Arc::new(Mutex::default());
-        let splitter = Splitter { tasks, line: Vec::new(), is_too_long: false, found: Inbox::default() };
-        let theirs = Arc::clone(&inbox);
-        let read = move || read(input, splitter, &theirs, &is_back_later);
+        let shared = Arc::new(Shared { inbox: Mutex::default(), tasks: RwLock::new(tasks) });
+        let theirs = Arc::clone(&shared);
+        let read = move || read(input, &theirs, &is_back_later);
         std::thread::Builder::new().name("words".into()).spawn(read)?;
-        Ok(Self(inbox))
+        Ok(Self(shared))
+    }
+
+    /// Begins anew for a run with other tasks: what was read before it is forgotten.
+    pub(crate) fn begin(&self, tasks: Vec<String>) {
+        *self.0.tasks.write().unwrap_or_else(PoisonError::into_inner) = tasks;
+        let mut inbox = self.0.inbox.lock().unwrap_or_else(PoisonError::into_inner);
+        *inbox = Inbox { is_closed: inbox.is_closed, ..Inbox::default() };
     }
 
     /// Calls `take` with what has been read, and returns whether more can come. It never waits for the reading thread: if
     /// that is handing something over, there is nothing yet.
     pub(crate) fn look(&self, take: impl FnOnce(&mut Inbox)) -> bool {
-        let mut inbox = match self.0.try_lock() {
+        let mut inbox = match self.0.inbox.try_lock() {
             Ok(inbox) => inbox,
             Err(TryLockError::Poisoned(poisoned)) => poisoned.into_inner(),
             Err(TryLockError::WouldBlock) => return true,
@@ -83,23 +97,20 @@ impl Inbox {
 
 /// Reads an input to its end. All lines that are read at once are handed over at once, so a `resume` in the same write
 /// as a `stop` is never taken for a later one.
-fn read(
-    mut input: impl Read,
-    mut splitter: Splitter,
-    inbox: &Mutex<Inbox>,
-    is_back_later: &dyn Fn(&std::io::Error) -> bool,
-) {
+fn read(mut input: impl Read, shared: &Shared, is_back_later: &dyn Fn(&std::io::Error) -> bool) {
     /// A flood leaves the processor to the ticks for this time after each chunk.
     const REST: Duration = Duration::from_millis(1);
     const WAIT: Duration = Duration::from_millis(100);
-    let hand_over = |found: &mut Inbox| inbox.lock().unwrap_or_else(PoisonError::into_inner).add(found);
-    let (mut chunk, mut was_away) = (vec![0; CHUNK], false);
+    let inbox = || shared.inbox.lock().unwrap_or_else(PoisonError::into_inner);
+    let tasks = || shared.tasks.read().unwrap_or_else(PoisonError::into_inner);
+    let hand_over = |found: &mut Inbox| inbox().add(found);
+    let (mut chunk, mut was_away, mut splitter) = (vec![0; CHUNK], false, Splitter::default());
     loop {
         match input.read(&mut chunk) {
             Ok(0) => break,
             Ok(size) => {
                 was_away = false;
-                splitter.split(&chunk[..size]);
+                splitter.split(&chunk[..size], &tasks());
                 if !hand_over(&mut splitter.found) || size == CHUNK {
                     std::thread::sleep(REST);
                 }
@@ -122,15 +133,14 @@ fn read(
             }
         }
     }
-    splitter.end_line();
+    splitter.end_line(&tasks());
     hand_over(&mut splitter.found);
-    inbox.lock().unwrap_or_else(PoisonError::into_inner).is_closed = true;
+    inbox().is_closed = true;
 }
 
 /// Splits bytes into lines.
+#[derive(Default)]
 struct Splitter {
-    /// The names of the tasks that can be stopped.
-    tasks: Vec<String>,
     /// The line so far.
     line: Vec<u8>,
     is_too_long: bool,
@@ -138,7 +148,7 @@ struct Splitter {
 }
 
 impl Splitter {
-    fn split(&mut self, bytes: &[u8]) {
+    fn split(&mut self, bytes: &[u8], tasks: &[String]) {
         let is_end = |byte: &u8| matches!(byte, b'\n' | b'\r');
         for piece in bytes.split_inclusive(is_end) {
             let (text, ends) = match piece.split_last() {
@@ -149,17 +159,17 @@ impl Splitter {
             self.is_too_long |= text.len() > room;
             self.line.extend_from_slice(&text[..text.len().min(room)]);
             if ends {
-                self.end_line();
+                self.end_line(tasks);
             }
         }
     }
 
-    fn end_line(&mut self) {
+    fn end_line(&mut self, tasks: &[String]) {
         let found = &mut self.found;
         let has_room = found.lines.len() < MAX_LINES;
         match std::str::from_utf8(&self.line).map(|line| line.trim_start_matches('\u{feff}').trim()) {
             Ok("") if !self.is_too_long => {}
-            Ok(word) if !self.is_too_long && stops(word, &self.tasks) => {
+            Ok(word) if !self.is_too_long && stops(word, tasks) => {
                 found.stop(&(word[..word.len() - STOP.len()].to_owned() + STOP));
             }
             _ if !has_room => found.dropped += 1,
@@ -258,6 +268,34 @@ mod tests {
             "go",
         ];
         assert_eq!(words(&found(Cursor::new(long))), expected);
+    }
+
+    #[test]
+    fn a_further_run_forgets_what_was_typed_and_has_its_own_tasks() {
+        let (mut ours, theirs) = std::io::pipe().map(|(read, write)| (write, read)).unwrap();
+        let reader = LineReader::start(theirs, vec!["left".into()], |_| false).unwrap();
+        let mut typed = |text: &[u8]| {
+            io::Write::write_all(&mut ours, text).unwrap();
+            let mut found = (Vec::new(), Vec::new());
+            while found.0.is_empty() {
+                std::thread::sleep(Duration::from_millis(1));
+                reader.look(|inbox| found = (inbox.lines.iter().flatten().cloned().collect(), inbox.stops.clone()));
+            }
+            found
+        };
+        let words = |words: &[&str]| words.iter().map(|word| (*word).to_owned()).collect::<Vec<_>>();
+        assert_eq!(
+            typed(b"right.stop\nleft.stop\nresume\n"),
+            (words(&["right.stop", "resume"]), words(&["left.stop"]))
+        );
+        reader.begin(vec!["right".into()]);
+        assert_eq!(typed(b"right.stop\ngo\n"), (words(&["go"]), words(&["right.stop"])));
+        drop(ours);
+        while reader.look(|inbox| *inbox = Inbox { is_closed: inbox.is_closed, ..Inbox::default() }) {
+            std::thread::sleep(Duration::from_millis(1));
+        }
+        reader.begin(Vec::new());
+        assert!(!reader.look(|_| {}), "a further run knows that nothing more comes");
     }
 
     #[test]

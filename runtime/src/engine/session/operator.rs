@@ -2,7 +2,7 @@
 
 use std::collections::VecDeque;
 use std::io::{IsTerminal, stdin};
-use std::sync::Arc;
+use std::sync::{Arc, Mutex, PoisonError};
 
 use super::engine::Engine;
 use super::line_reader::{LineReader, stops};
@@ -36,7 +36,7 @@ impl OperatorInput {
             options.sends.iter().map(|(seconds, word)| ((seconds * 1e9) as i64, word.clone())).collect();
         scheduled.sort_by_key(|(at, _)| *at);
         let tasks: Vec<String> = engine.tasks().iter().skip(1).map(TaskRun::name).map(str::to_owned).collect();
-        let reader = options.listens.then(|| LineReader::start(stdin(), tasks.clone(), is_back_later)).transpose()?;
+        let reader = options.listens.then(|| typed(tasks.clone())).transpose()?;
         let requests = options.requests.clone();
         Ok(Self { scheduled: scheduled.into(), tasks, reader, requests, warnings: Warnings::default() })
     }
@@ -86,6 +86,18 @@ impl OperatorInput {
     pub(crate) fn finish(&mut self) {
         self.warnings.finish();
     }
+}
+
+/// Returns the reader of the standard input. The process has one, because nothing ends a thread that reads from a
+/// terminal. A further run gets only what is typed from now on.
+fn typed(tasks: Vec<String>) -> std::io::Result<LineReader> {
+    static READER: Mutex<Option<LineReader>> = Mutex::new(None);
+    let mut reader = READER.lock().unwrap_or_else(PoisonError::into_inner);
+    if let Some(reader) = &*reader {
+        reader.begin(tasks);
+        return Ok(reader.clone());
+    }
+    Ok(reader.insert(LineReader::start(stdin(), tasks, is_back_later)?).clone())
 }
 
 /// Whether the standard input can be read again later: in the background, a terminal cannot be read.
