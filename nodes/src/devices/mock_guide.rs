@@ -37,10 +37,10 @@ struct Move {
 ///
 /// ```toml
 /// [roles]
-/// guide = { type = "motion_guide", on = "none" }
+/// joystick = { type = "motion_guide", on = "none" }
 ///
 /// [bind]
-/// guide = "hand"
+/// joystick = "hand"
 ///
 /// [devices.hand]
 /// type = "mock_guide"

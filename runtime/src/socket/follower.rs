@@ -117,7 +117,9 @@ mod tests {
         FedValue { port, stamp, row: Some(Row::Numbers(vec![number])) }
     }
 
-    fn numbers(line: &str) -> Vec<(String, i64, Option<Vec<Option<f64>>>)> {
+    type Values = Option<Vec<Option<f64>>>;
+
+    fn numbers(line: &str) -> Vec<(String, i64, Values)> {
         let line: Followed = serde_json::from_str(line).unwrap();
         line.ports.into_iter().map(|(name, sample)| (name, sample.stamp_ns, sample.values)).collect()
     }

@@ -40,7 +40,7 @@ pub struct Params {
 /// Somebody behind a topic of ROS 2 who guides an arm: a joystick, a planner, MoveIt. It needs no ROS installation.
 ///
 /// The messages have velocities in m/s and rad/s. Who lets go may stop publishing, or publish zeros. Silence is no failure
-/// of this device: the greatest age on the wire of the velocity, and `roles.guide` of `[policy]`, decide what it means.
+/// of this device: the greatest age on the wire of the velocity, and the policy of the role, decide what it means.
 ///
 /// The stamp of a message says when the velocity was wanted. It counts by the wall clock, so that one that was delayed moves
 /// nothing. A message is refused, counted (`bad messages`) and named in a warning if it has no stamp or another `frame_id`,
@@ -49,12 +49,12 @@ pub struct Params {
 ///
 /// ```toml
 /// [roles]
-/// guide = { type = "motion_guide", on = "none" }
+/// joystick = { type = "motion_guide", on = "none" }
 ///
 /// [bind]
-/// guide = "joystick"
+/// joystick = "hand"
 ///
-/// [devices.joystick]
+/// [devices.hand]
 /// type = "ros2_guide"
 /// topic = "/guide/twist"
 /// frame = "tactile_pad"
