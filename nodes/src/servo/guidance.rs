@@ -191,8 +191,8 @@ mod tests {
         let other: Shape = FeaturesShape::new([("x", Unit::METRE)]).into();
         let made = NodeRig::new::<Guidance>(SPEEDS, &[("velocity", other)]);
         assert_eq!(made.err().map(|mistakes| mistakes.len()), Some(1));
-        for (bad, place) in [("linear_m_per_s = -1\nangular_rad_per_s = 1", "bad-value: `-1`")] {
-            assert_eq!(places(bad, &NodeRig::new::<Guidance>(bad, &[("velocity", velocity())])), [place], "{bad}");
-        }
+        let bad = "linear_m_per_s = -1\nangular_rad_per_s = 1";
+        let made = NodeRig::new::<Guidance>(bad, &[("velocity", velocity())]);
+        assert_eq!(places(bad, &made), ["bad-value: `-1`"]);
     }
 }

@@ -54,6 +54,17 @@ fn states(listener: &Process) -> Vec<(u64, String)> {
     all
 }
 
+/// A pose and its transform are one, and the base has the name of ROS.
+fn assert_transforms_are_poses(poses: &[(f64, Value)], transforms: &[(f64, Value)]) {
+    let (_, pose) = poses.last().unwrap();
+    assert_eq!(pose["header"]["frame_id"], "link0");
+    let mut transforms = transforms.iter().map(|(_, tf)| &tf["transforms"][0]);
+    let same = transforms.find(|tf| tf["header"]["stamp"] == pose["header"]["stamp"]).unwrap();
+    assert_eq!((&same["child_frame_id"], &same["header"]["frame_id"]), (&json!("pad"), &json!("link0")));
+    assert_eq!(same["transform"]["translation"], pose["pose"]["position"]);
+    assert_eq!(same["transform"]["rotation"], pose["pose"]["orientation"]);
+}
+
 #[test]
 fn others_see_images_numbers_poses_and_transforms_as_the_run_computes_them() {
     let topics = json!({
@@ -121,14 +132,7 @@ fn others_see_images_numbers_poses_and_transforms_as_the_run_computes_them() {
     let mut ages: Vec<f64> = images.iter().map(|(at, image)| at - stamp(&image["header"])).collect();
     ages.sort_by(f64::total_cmp);
     assert!(ages[0] > 0.0 && ages[ages.len() / 2] < 0.1, "{ages:?}");
-    // A pose and its transform are one, and the base has the name of ROS.
-    let (_, pose) = of("/cell/move/sensor_pose").pop().unwrap();
-    assert_eq!(pose["header"]["frame_id"], "link0");
-    let transforms = of("/tf").into_iter().map(|(_, tf)| tf["transforms"][0].clone());
-    let same = transforms.clone().find(|tf| tf["header"]["stamp"] == pose["header"]["stamp"]).unwrap();
-    assert_eq!((&same["child_frame_id"], &same["header"]["frame_id"]), (&json!("pad"), &json!("link0")));
-    assert_eq!(same["transform"]["translation"], pose["pose"]["position"]);
-    assert_eq!(same["transform"]["rotation"], pose["pose"]["orientation"]);
+    assert_transforms_are_poses(&of("/cell/move/sensor_pose"), &of("/tf"));
     let states = states(&listener);
     assert!(states.contains(&(0, "mode servo".into())), "{states:?}");
     assert_eq!(states.last().unwrap(), &(0, "it has ended: the time limit is reached".into()));
