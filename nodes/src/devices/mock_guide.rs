@@ -45,7 +45,7 @@ struct Move {
 /// [devices.hand]
 /// type = "mock_guide"
 /// moves = [
-///   { velocity = [0.01, 0, 0, 0, 0, 0], from_s = 3.0, to_s = 5.0 },
+///   { velocity = [0.01, 0, 0, 0, 0, 0], from_s = 0.0, to_s = 60.0 },
 /// ]
 /// ```
 #[derive(Debug, Describe)]

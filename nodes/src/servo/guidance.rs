@@ -16,9 +16,10 @@ const NAMES: [&str; 6] = ["vx", "vy", "vz", "wx", "wy", "wz"];
 /// is too fast is scaled down as a whole, so its direction stays. Choose the components that may be guided with a
 /// `projector` behind it: those that the controller does not need.
 ///
-/// State the greatest age of the velocity on its wire, and let the policy of the role count, so that the task goes on
-/// without a guide: `roles.joystick = { stale = "count" }`. When the guide is silent for so long, or a component is missing,
-/// the output is absent, and `bumpless` brings the motion to zero smoothly.
+/// State the greatest age of the velocity on its wire, `in.velocity = { from = "joystick.velocity", max_age_ms = 200 }`, and
+/// let the policy of the role count, so that the task goes on without a guide: `roles.joystick = { stale = "count" }`. When
+/// the guide is silent for so long, or a component is missing, the output is absent, and `bumpless` brings the motion to zero
+/// smoothly.
 ///
 /// With `in.gate`, the sensor is guided only while that flag is present and set. Without it, only the `blind_limit` bounds
 /// the motion through the air.
@@ -26,7 +27,7 @@ const NAMES: [&str; 6] = ["vx", "vy", "vz", "wx", "wy", "wz"];
 /// ```toml
 /// [nodes.guidance]
 /// type = "guidance"
-/// in.velocity = { from = "joystick.velocity", max_age_ms = 200 }
+/// in.velocity = "joystick.velocity"
 /// in.gate = "label.present"
 /// linear_m_per_s = 0.02
 /// angular_rad_per_s = 0.2
