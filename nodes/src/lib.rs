@@ -61,6 +61,7 @@ fn edge() -> Catalogue {
         .role(roles::velocity_arm())
         .role(roles::bare_arm())
         .role(roles::force_sensor())
+        .role(roles::motion_guide())
         .role(roles::ground_truth())
         .role(roles::true_object())
         // The first that fills a role is the one that examples take.
@@ -68,6 +69,7 @@ fn edge() -> Catalogue {
         .device::<devices::recording::Player>()
         .device::<devices::mock_arm::MockArm>()
         .device::<devices::mock_force::MockForce>()
+        .device::<devices::mock_guide::MockGuide>()
         .device::<sim::bench::SimBench>()
         .device::<sim::pair::SimPair>()
         .device::<devices::lockstep::Lockstep>();
@@ -85,10 +87,11 @@ fn edge() -> Catalogue {
     let catalogue = catalogue
         .device::<devices::ros2::Ros2Pad>()
         .device::<devices::ros2::Ros2Force>()
+        .device::<devices::ros2::Ros2Guide>()
         .device::<devices::ros2::Ros2Arm>();
     #[cfg(not(feature = "ros2"))]
     let catalogue = catalogue.left_out(
-        &["ros2_pad", "ros2_force", "ros2_arm"],
+        &["ros2_pad", "ros2_force", "ros2_guide", "ros2_arm"],
         "build the tool with ROS 2: `cargo install --path nodes --features ros2` (docs/ros2.md)",
     );
     #[cfg(feature = "process")]
@@ -136,6 +139,7 @@ pub fn catalogue() -> Catalogue {
         .node::<servo::inverse_jacobian::InverseJacobian>()
         .node::<servo::projector::Projector>()
         .node::<servo::twist_source::TwistSource>()
+        .node::<servo::guidance::Guidance>()
         .node::<servo::scan_guide::ScanGuide>()
         .node::<servo::ridge_guide::RidgeGuide>()
         .node::<servo::hold_pose::HoldPose>()

@@ -91,6 +91,18 @@ pub fn force_sensor() -> RoleType {
     }
 }
 
+/// Somebody who guides an arm by a velocity: a person with a joystick, or a planner.
+///
+/// Its output is no twist, so that no wire leads from it to an arm without a node that bounds it.
+pub fn motion_guide() -> RoleType {
+    RoleType {
+        name: "motion_guide".into(),
+        summary: "a velocity by which somebody guides an arm".into(),
+        outputs: vec![PortSpec::new("velocity", GUIDED, Kind::Features, &["_", "self"]).of_quantity("guidance")],
+        ..RoleType::default()
+    }
+}
+
 /// The limits that need a pad: a bare arm feels no contact, so nothing could enforce them.
 const OF_PADS: [&str; 3] = ["force", "peak", "blind"];
 
@@ -104,6 +116,9 @@ const EQUILIBRIUM: &str = "Posture that the commands add up to: where a complian
 
 const WRENCH: &str = "The wrench that the environment exerts on the tool, about the origin of the tip and in its axes: \
     fx, fy, fz [N], tx, ty, tz [N m]. The other ports are its components.";
+
+const GUIDED: &str =
+    "The wanted velocity, in the frame in which the task uses it: vx, vy, vz [m/s], wx, wy, wz [rad/s].";
 
 /// Facts of the contact that a simulation knows and no sensor measures: for scenarios and the recorder. A device that
 /// fills it gives all of it, and says of what does not apply that it is absent.

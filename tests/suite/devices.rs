@@ -464,4 +464,6 @@ fn a_device_that_the_build_leaves_out_is_no_misspelling() {
     let text = checked.out + &checked.err;
     assert!(text.contains("this build leaves out the device type `ros2_arm`"), "{text}");
     assert!(text.contains("cargo install --path nodes --features ros2") && !text.contains("did you mean"), "{text}");
+    let command = crate::tool::say(&["ros2", "publish", "pad.image", "--wait"]);
+    assert!(command.code == 2 && command.err.contains("this build leaves out `ros2`\nhelp: build"), "{}", command.err);
 }

@@ -44,6 +44,7 @@ mod freshness;
 mod fuzz;
 #[cfg(target_os = "linux")]
 mod growth;
+mod guided;
 mod keep_out;
 mod layers;
 mod leases;
@@ -90,7 +91,7 @@ mod sim;
 mod situations;
 mod slow;
 #[cfg(unix)]
-mod socket;
+pub(crate) mod socket;
 #[cfg(target_os = "linux")]
 mod stream;
 mod svg;

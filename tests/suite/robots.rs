@@ -23,12 +23,13 @@ const SMALL_PAD: &str = "rows = 8\ncols = 8\npitch = 0.003\nrate_hz = 100\n";
 
 /// The shipped tasks: the modes on the way to the work, a time by which each is there [s], and the place of the pressure
 /// among the errors of a task that controls it in newtons.
-const TASKS: [(&str, &[&str], f64, Option<usize>); 11] = [
+const TASKS: [(&str, &[&str], f64, Option<usize>); 12] = [
     ("cable", &["approach", "servo"], 2.0, Some(2)),
     ("edge", &["approach", "servo"], 2.0, Some(0)),
     ("explore", &["approach", "align", "scan"], 3.0, Some(2)),
     ("finger_press", &["none"], 2.0, None),
     ("force", &["approach", "servo"], 2.0, Some(0)),
+    ("guided", &["approach", "press", "guided"], 4.5, Some(0)),
     ("hold_without_slip", &["approach", "servo"], 2.0, None),
     ("hybrid", &["approach", "servo"], 2.0, Some(2)),
     ("position", &["approach", "servo"], 2.0, None),

@@ -1,5 +1,8 @@
 //! Devices over ROS 2 against CycloneDDS in another process, `tests/peers/ros2/robot.py`: docs/ros2.md.
 
+mod guide;
+mod shown;
+
 use std::fs;
 use std::io::Write;
 use std::process::{Child, Command, Stdio};
@@ -278,6 +281,7 @@ fn assert_says(domain: u32, settings: Value, word: Option<&str>, expected: &str)
 #[test]
 fn what_is_wrong_on_the_topics_is_named() {
     let of_others = "has the joints `finger`, and none of ours";
+    let twice = ["a1", "a2", "e1", "a3", "a4", "a5", "a6", "a1"].map(|joint| format!("lwr_{joint}_joint"));
     let cases = [
         (
             json!({ "state_type": "String" }),
@@ -288,6 +292,7 @@ fn what_is_wrong_on_the_topics_is_named() {
             "lacks the joint `lwr_e1_joint`; it has `lwr_a1_joint`, ",
         ),
         (json!({ "names": ["finger"] }), of_others),
+        (json!({ "names": twice }), "has the joint `lwr_a1_joint` more than once in a message"),
         (json!({ "nan_at": 0.0 }), "the controller reports no number as the position of joint"),
         (json!({ "stamp_offset": -1.7e9 }), "are years away from the clock of this machine"),
         (json!({ "stamp_offset": -0.5 }), "behind the clock of this machine, and at most 20 ms"),

@@ -1,6 +1,7 @@
 //! A graph that runs is reached from other processes: it shows its values, changes, stops, and is delayed by nobody.
 
-mod session;
+mod follow;
+pub(crate) mod session;
 
 use std::io::{BufRead, BufReader, Read, Write};
 use std::os::unix::fs::PermissionsExt;
@@ -120,9 +121,15 @@ fn only_words_that_stop_are_sent() {
     let halted = |session: &Session| session.about()["tasks"][0]["halted"].as_bool().unwrap();
     wait_for(|| halted(&session).then_some(()), "halt");
     assert!(session.print(&["ps"]).contains("halted"));
+    let task = session.about()["tasks"][0].clone();
+    assert!(
+        task["reason"].as_str().unwrap().contains("the operator sent `stop`") && task["halts"] == json!(1),
+        "{task}"
+    );
     // The terminal of the run resumes.
     session.runs[0].stdin.as_mut().unwrap().write_all(b"resume\n").unwrap();
     wait_for(|| (!halted(&session)).then_some(()), "end of the halt");
+    assert!(session.about()["tasks"][0]["reason"].is_null());
     session.print(&["set", "pid.gains.y.kp=4"]);
     wait_for(|| session.print(&["get", KP]).contains(" 4 ").then_some(()), "end of the change");
     let end = session.end();

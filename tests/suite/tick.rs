@@ -98,7 +98,8 @@ fn a_parameter_changes_without_allocating_or_freeing_in_the_tick() {
     assert!(recorder.finish(|_| true).error.is_none());
 }
 
-/// The socket of an engine, of which one client watches everything and another one asks again and again.
+/// The socket of an engine, of which one client watches everything, one follows everything, and another one asks again and
+/// again.
 #[cfg(unix)]
 struct Watched {
     feed: Feed,
@@ -120,6 +121,11 @@ impl Watched {
         watcher.read_line(&mut answer).unwrap();
         // A graph of images alone has no number.
         assert!(answer == "{\"ok\":null}\n" || answer.contains("no number of a port"), "{answer}");
+        let mut follower = BufReader::new(UnixStream::connect(&path).unwrap());
+        follower.get_mut().write_all(b"{\"ask\":\"follow\",\"ports\":[\"*\"],\"period_ms\":5}\n").unwrap();
+        follower.read_line(&mut answer).unwrap();
+        assert!(answer.contains("\"kind\":\"image\""), "{answer}");
+        std::thread::spawn(move || follower.lines().map_while(Result::ok).for_each(drop));
         let mut asker = BufReader::new(UnixStream::connect(&path).unwrap());
         std::thread::spawn(move || {
             let mut answer = String::new();

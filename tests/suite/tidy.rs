@@ -128,6 +128,7 @@ fn only_the_edge_names_tokio() {
     let edge = [
         "runtime/src/device/live.rs",
         "runtime/src/engine/session/caught.rs",
+        "runtime/src/socket/follower.rs",
         "runtime/src/socket/hub.rs",
         "runtime/src/socket/lines.rs",
         "runtime/src/socket/server.rs",
@@ -152,6 +153,7 @@ fn only_the_edge_names_tokio() {
         "nodes/src/devices/process/session.rs",
         "nodes/src/devices/process/stepped.rs",
         "nodes/src/devices/ros2/driver.rs",
+        "nodes/src/devices/ros2/guide.rs",
         "nodes/src/devices/ros2/sensor.rs",
         "nodes/src/devices/stream/driver.rs",
         "nodes/src/tool/sniff.rs",

@@ -5,6 +5,7 @@ use std::borrow::Cow;
 #[cfg(feature = "drivers")]
 pub mod agni;
 pub(crate) mod arm;
+pub(crate) mod guide;
 #[cfg(feature = "drivers")]
 pub(crate) mod link;
 pub mod lockstep;
@@ -12,6 +13,7 @@ pub mod lockstep;
 pub mod lwr_fri;
 pub mod mock_arm;
 pub mod mock_force;
+pub mod mock_guide;
 pub mod mock_pad;
 pub(crate) mod pad;
 #[cfg(feature = "process")]

@@ -7,6 +7,7 @@ pub mod edge_guard;
 pub mod feature_error;
 pub mod follow_path;
 pub mod gain_schedule;
+pub mod guidance;
 pub mod hold_pose;
 pub mod integral;
 pub mod inverse_jacobian;

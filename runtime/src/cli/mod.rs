@@ -50,6 +50,8 @@ use shell::{Colour, standard_error};
 pub use clap;
 pub use reference::pages::reference;
 pub use run::{Commissioning, Job, JobOptions, Print, Proof, duration};
+#[cfg(unix)]
+pub use running::{FoundRun, NotFound, RunArg};
 pub use shell::command::{CommandEnd, GraphArgs, OutputFormat, Subcommand, derived};
 pub use shell::{FAULTED, INTERRUPTED, NOT_LOADED, Shell};
 pub use text::{figure, svg, table::table};

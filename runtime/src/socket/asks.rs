@@ -34,36 +34,104 @@ pub(crate) enum Ask {
         /// The number of samples after which it ends.
         count: Option<u64>,
     },
+    /// Sends the newest values of whole ports, images included, each with the time of its sample.
+    Follow {
+        /// Names and patterns.
+        ports: Vec<String>,
+        /// Shortest time between two lines [ms].
+        period_ms: f64,
+    },
+}
+
+/// What does not change of a port that is followed.
+#[derive(Debug, Clone, Serialize, Deserialize)]
+pub struct PortFacts {
+    /// `node.port`, or the name under which a part exports it.
+    pub name: String,
+    /// Its kind, such as `features`.
+    pub kind: String,
+    /// Its frames. A pose has its own and the one in which it is written; `None` where the wires do not determine one.
+    pub frames: Vec<Option<String>>,
+    /// Its numbers, each with its name, which is empty in a port with one number, and its unit; none in an image.
+    pub numbers: Vec<(String, String)>,
+    /// What an image has instead.
+    pub image: Option<ImageFacts>,
+}
+
+/// What does not change of an image.
+#[derive(Debug, Clone, Serialize, Deserialize)]
+pub struct ImageFacts {
+    /// Number of rows, along y.
+    pub rows: usize,
+    /// Number of columns, along x.
+    pub cols: usize,
+    /// Distance of neighbouring tactels along x and y [m].
+    pub pitch: [f64; 2],
+    /// Unit of its values.
+    pub unit: String,
+}
+
+/// What a followed run sends in a line.
+#[derive(Debug, Clone, Default, Serialize, Deserialize)]
+#[serde(default)]
+pub struct Followed {
+    /// The values that are new, by the names of their ports.
+    pub ports: BTreeMap<String, PortSample>,
+    /// How the run has ended, in the last line.
+    pub end: Option<RunEnd>,
+}
+
+/// The newest value of a port.
+#[derive(Debug, Clone, Serialize, Deserialize)]
+pub struct PortSample {
+    /// Time of the sample from which it was computed, by the wall clock [ns since 1970].
+    pub stamp_ns: i64,
+    /// Its numbers, or the cells of an image row by row; those of a vector image have three. `None` while it is absent. A
+    /// component that is absent, or is not finite, is `None`.
+    pub values: Option<Vec<Option<f64>>>,
+}
+
+/// How a run has ended.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct RunEnd {
+    /// The reason.
+    pub reason: String,
+    /// Whether it is a fault.
+    pub is_fault: bool,
 }
 
 /// Which run this is, and its state.
 #[derive(Debug, Clone, Serialize, Deserialize)]
-pub(crate) struct About {
+pub struct About {
     /// Number of the process.
-    pub(crate) pid: u32,
+    pub pid: u32,
     /// The graph, as on the command line.
-    pub(crate) graph: String,
+    pub graph: String,
     /// Time of the wall clock at which it began [s since 1970].
-    pub(crate) since: f64,
+    pub since: f64,
     /// Time of the last tick [s].
-    pub(crate) t: f64,
+    pub t: f64,
     /// Number of the last tick.
-    pub(crate) tick: u64,
+    pub tick: u64,
     /// The graph itself and the parts that are tasks.
-    pub(crate) tasks: Vec<TaskState>,
+    pub tasks: Vec<TaskState>,
 }
 
 /// The state of a task.
 #[derive(Debug, Clone, Serialize, Deserialize)]
-pub(crate) struct TaskState {
+pub struct TaskState {
     /// Its name; empty for the graph itself.
-    pub(crate) name: String,
+    pub name: String,
     /// Its mode; none in a task without modes.
-    pub(crate) mode: Option<String>,
+    pub mode: Option<String>,
     /// Whether its commands are held at zero.
-    pub(crate) halted: bool,
+    pub halted: bool,
     /// Whether it has ended.
-    pub(crate) ended: bool,
+    pub ended: bool,
+    /// Number of halts so far.
+    pub halts: u64,
+    /// Why its commands are held, or why it has failed.
+    pub reason: Option<String>,
 }
 
 /// The values of a run.

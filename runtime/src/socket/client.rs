@@ -7,7 +7,7 @@ use std::time::Duration;
 
 use serde::de::DeserializeOwned;
 
-use super::asks::{Answer, Ask};
+use super::asks::{Answer, Ask, Followed, PortFacts};
 
 /// Longest wait for an answer.
 const MAX_ANSWER: Duration = Duration::from_secs(3);
@@ -85,6 +85,44 @@ impl Client {
                 Err("the run does not answer in time".into())
             }
             Err(error) => Err(format!("the run does not answer: {error}")),
+        }
+    }
+}
+
+/// Ports of a run that are followed: their newest values, images included.
+pub struct Following {
+    client: Client,
+    ports: Vec<PortFacts>,
+}
+
+impl Following {
+    /// Follows the ports that names and patterns mean, with at least `period_ms` between two lines.
+    ///
+    /// # Errors
+    /// If a name means no port, or the run does not answer.
+    pub(crate) fn begin(path: &Path, ports: Vec<String>, period_ms: f64) -> Result<Self, String> {
+        let mut client = Client::connect(path)?;
+        let ports = client.ask(&Ask::Follow { ports, period_ms })?;
+        client.wait_for_ever()?;
+        Ok(Self { client, ports })
+    }
+
+    /// Returns what does not change of the ports.
+    #[must_use]
+    pub fn ports(&self) -> &[PortFacts] {
+        &self.ports
+    }
+
+    /// Waits for the next values. `None` if the run is gone. Before that, a run that has ended by itself says how.
+    ///
+    /// # Errors
+    /// If the run sends something else.
+    pub fn wait(&mut self) -> Result<Option<Followed>, String> {
+        match self.client.line()? {
+            Sample::End => Ok(None),
+            Sample::Line(line) => serde_json::from_str(&line)
+                .map(Some)
+                .map_err(|error| format!("the run answers in another version of the protocol: {error}")),
         }
     }
 }

@@ -4,12 +4,14 @@ use std::collections::BTreeMap;
 use std::path::Path;
 use std::time::{SystemTime, UNIX_EPOCH};
 
-use super::asks::{About, Got, LiveState, Origin, PortState, TaskState};
-use super::feed::{Frame, Whole, is_fed};
+use super::asks::{About, Got, ImageFacts, LiveState, Origin, PortFacts, PortState, TaskState};
+use super::feed::is_fed;
+use super::frames::{Frame, Whole};
 use crate::engine::{Engine, TaskRun};
-use crate::graph::{Compiled, LiveParam, matches};
+use crate::graph::{Compiled, LiveParam, PlannedPort, matches};
 use crate::outline::{Outline, ValueOrigin};
 use crate::record::{PortColumns, file_seconds as seconds};
+use crate::signal::{Shape, VectorImageShape};
 use crate::source::{SourceMap, suggest_name, suggestion};
 
 /// What the socket states of a run, taken from the graph before it runs.
@@ -55,6 +57,26 @@ fn origins(outline: &Outline, graph: &Path) -> Vec<(String, Origin)> {
     origins
 }
 
+/// Describes a port that can be followed.
+fn port_facts(port: &PlannedPort) -> PortFacts {
+    let image = match &port.shape {
+        Shape::Image(image) | Shape::VectorImage(VectorImageShape(image)) => Some(image),
+        _ => None,
+    };
+    PortFacts {
+        name: port.name.clone(),
+        kind: port.shape.kind().name().to_owned(),
+        frames: port.frames.clone(),
+        numbers: port.shape.scalars().into_iter().map(|(name, unit)| (name, unit.to_string())).collect(),
+        image: image.map(|image| ImageFacts {
+            rows: image.rows,
+            cols: image.cols,
+            pitch: image.pitch,
+            unit: image.unit.to_string(),
+        }),
+    }
+}
+
 /// A number of a port.
 #[derive(Debug)]
 pub(super) struct Column {
@@ -75,6 +97,21 @@ impl Column {
     }
 }
 
+/// A port that can be followed.
+#[derive(Debug)]
+struct Followable {
+    facts: PortFacts,
+    /// The names under which parts export it.
+    exports: Vec<String>,
+}
+
+impl Followable {
+    /// Returns the name under which a pattern means this port: its own, or that of an export.
+    fn called(&self, pattern: &str) -> Option<&str> {
+        std::iter::once(&self.facts.name).chain(&self.exports).find(|name| matches(pattern, name)).map(String::as_str)
+    }
+}
+
 /// What does not change while a graph runs.
 #[derive(Debug)]
 pub(super) struct Described {
@@ -84,6 +121,8 @@ pub(super) struct Described {
     tasks: Vec<(String, Vec<String>)>,
     live: Vec<LiveParam>,
     pub(super) columns: Vec<Column>,
+    /// The ports of the feed, in its order.
+    followable: Vec<Followable>,
     /// The words that the graph accepts.
     words: Vec<String>,
 }
@@ -92,8 +131,10 @@ impl Described {
     pub(super) fn of(engine: &Engine, facts: RunFacts) -> Self {
         let since = SystemTime::now().duration_since(UNIX_EPOCH).map_or(0.0, |since| since.as_secs_f64());
         let task = |task: &TaskRun| (task.name().to_owned(), task.mode_names().map(str::to_owned).collect());
-        let mut columns = Vec::new();
+        let (mut columns, mut followable) = (Vec::new(), Vec::new());
         for (port, (planned, _)) in engine.ports().iter().filter(|(port, _)| is_fed(port)).enumerate() {
+            let exports = facts.exports.iter().filter(|(_, port)| *port == planned.name).map(|(export, _)| export);
+            followable.push(Followable { facts: port_facts(planned), exports: exports.cloned().collect() });
             for (index, column) in PortColumns::of(planned).into_iter().enumerate() {
                 let exports = facts.exports.iter().filter(|(_, port)| *port == planned.name).map(|(export, _)| export);
                 let names = std::iter::once(&planned.name).chain(exports);
@@ -108,6 +149,7 @@ impl Described {
             tasks: engine.tasks().iter().map(task).collect(),
             live: engine.live_values().map(|live| live.param.clone()).collect(),
             columns,
+            followable,
             words: engine.words(),
         }
     }
@@ -119,6 +161,8 @@ impl Described {
             mode: task.mode.and_then(|mode| modes.get(mode).cloned()),
             halted: task.is_halted,
             ended: task.has_ended,
+            halts: task.halts,
+            reason: Some(task.reason.clone()).filter(|reason| !reason.is_empty()),
         });
         About {
             pid: std::process::id(),
@@ -190,6 +234,34 @@ impl Described {
             }
         }
         if found.is_empty() { Err("name a port: `get` lists them".into()) } else { Ok(found.into_iter().collect()) }
+    }
+
+    /// Returns the ports that names and patterns mean, by their numbers in the feed, each under the name by which it is
+    /// meant. Who follows none gets the end of the run.
+    ///
+    /// # Errors
+    /// If a name means none.
+    pub(super) fn find_ports(&self, patterns: &[String]) -> Result<BTreeMap<usize, PortFacts>, String> {
+        let mut found = BTreeMap::new();
+        for pattern in patterns {
+            let mut is_any = false;
+            for (number, port) in self.followable.iter().enumerate() {
+                let Some(name) = port.called(pattern) else { continue };
+                found.entry(number).or_insert_with(|| PortFacts { name: name.to_owned(), ..port.facts.clone() });
+                is_any = true;
+            }
+            if !is_any {
+                let known = self.followable.iter().flat_map(|port| port.exports.iter().chain([&port.facts.name]));
+                let close = suggest_name(pattern, known.map(String::as_str));
+                let way_out = close.map_or_else(
+                    || "`tactflow get` lists those with numbers".into(),
+                    |close| format!("did you mean `{close}`?"),
+                );
+                let kinds = "masks, regions and Jacobians cannot be followed";
+                return Err(format!("no port with numbers and no image is called `{pattern}`; {way_out} ({kinds})"));
+            }
+        }
+        Ok(found)
     }
 
     fn unknown(&self, what: &str, name: &str) -> String {

@@ -1,31 +1,28 @@
 //! The ring between the tick and the thread of the socket. The tick writes only what is wanted: the ports that somebody
 //! watches, and now and then everything.
-//!
-//! A frame is a list of 64-bit words: its length, its type, the number and the time of the tick, and the values. A port is
-//! one word that says whether it is present, and one for each of its numbers.
 
+use std::fmt::Write;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 
-use rtrb::{Consumer, Producer};
+use rtrb::Producer;
 
-use crate::engine::Engine;
+use super::frames::{FeedReader, HEAD, NO_MODE, WATCHED, WHOLE, Width, extend_with_pairs};
+use crate::engine::{Engine, TaskEnd, TaskRun};
 use crate::graph::PlannedPort;
 use crate::node::PortId;
 use crate::record::touched_ring;
-use crate::signal::Kind;
+use crate::signal::{Image, Kind, Signal, VectorImage};
 
-/// Types of frames.
-const WATCHED: u64 = 1;
-const WHOLE: u64 = 2;
-/// Words before the values of a frame.
-const HEAD: usize = 4;
+/// Words of a watched port before its values: its number, whether it is present, and its stamp.
+const PORT_HEAD: usize = 3;
 /// Smallest number of words in the ring.
 const MIN_WORDS: usize = 1 << 16;
-/// Frames of all values for which the ring has room at least.
+/// Frames of all numbers, and of all images, for which the ring has room at least.
 const MIN_FRAMES: usize = 8;
-/// The mode of a task without modes.
-const NO_MODE: u64 = u64::MAX;
+const MIN_IMAGES: usize = 2;
+/// Longest reason of a halt or an end [bytes].
+const MAX_REASON: usize = 512;
 
 /// What the thread of the socket wants from the tick.
 #[derive(Debug)]
@@ -36,6 +33,8 @@ pub(super) struct Wishes {
     is_any_watched: AtomicBool,
     /// Whether each port is watched.
     watched: Vec<AtomicBool>,
+    /// Whether each watched port is wanted at once, also if it has not changed.
+    at_once: Vec<AtomicBool>,
     /// Frames of watched ports for which the ring had no room.
     lost: AtomicU64,
 }
@@ -56,22 +55,37 @@ impl Wishes {
         self.is_any_watched.store(is_any, Ordering::Release);
     }
 
+    /// Asks for the value of a watched port at once.
+    pub(super) fn want_at_once(&self, port: usize) {
+        self.at_once[port].store(true, Ordering::Release);
+    }
+
     /// Takes the number of frames that were lost.
     pub(super) fn take_lost(&self) -> u64 {
         self.lost.swap(0, Ordering::Relaxed)
     }
 }
 
-/// A port with numbers.
+/// A port with numbers, or an image.
 struct FedPort {
     id: PortId,
     kind: Kind,
-    width: usize,
+    width: Width,
+}
+
+/// Why the commands of a task are held, or why it has ended.
+#[derive(Default)]
+struct Reason {
+    /// The halts and the end that it is of.
+    of: (usize, bool),
+    text: String,
 }
 
 /// The end of the ring in the tick.
 pub struct Feed {
     ports: Vec<FedPort>,
+    /// Of each task.
+    reasons: Vec<Reason>,
     /// The numbers of one port.
     row: Vec<f64>,
     frame: Vec<u64>,
@@ -79,54 +93,9 @@ pub struct Feed {
     wishes: Arc<Wishes>,
 }
 
-/// The other end of the ring.
-pub(super) struct FeedReader {
-    widths: Vec<usize>,
-    tasks: usize,
-    live: usize,
-    ring: Consumer<u64>,
-    frame: Vec<u64>,
-}
-
-/// What a tick has written.
-#[derive(Debug)]
-pub(super) struct Frame {
-    pub(super) tick: u64,
-    /// Time of the tick [ns].
-    pub(super) now: i64,
-    pub(super) content: Content,
-}
-
-#[derive(Debug)]
-pub(super) enum Content {
-    /// The watched ports that have changed: the number of each, and its numbers if it is present.
-    Watched(Vec<(usize, Option<Vec<f64>>)>),
-    /// Everything.
-    Whole(Whole),
-}
-
-/// The state of a task.
-#[derive(Debug)]
-pub(super) struct FedTask {
-    /// Number of its mode; none in a task without modes.
-    pub(super) mode: Option<usize>,
-    pub(super) is_halted: bool,
-    pub(super) has_ended: bool,
-}
-
-/// Everything that a run shows.
-#[derive(Debug)]
-pub(super) struct Whole {
-    pub(super) tasks: Vec<FedTask>,
-    /// The value and the target of each live parameter.
-    pub(super) live: Vec<[f64; 2]>,
-    /// The numbers of each port, if it is present.
-    pub(super) ports: Vec<Option<Vec<f64>>>,
-}
-
-/// Whether a port has numbers: images, masks, regions and Jacobians have none.
+/// Whether a port has numbers or is an image: masks, regions and Jacobians are neither.
 pub(super) fn is_fed(port: &PlannedPort) -> bool {
-    !port.shape.scalars().is_empty()
+    Width::of(&port.shape).words() > 0
 }
 
 /// Creates the ring of an engine.
@@ -135,28 +104,39 @@ pub(super) fn feed(engine: &Engine) -> (Feed, FeedReader, Arc<Wishes>) {
     let port = |(port, id): &(PlannedPort, PortId)| FedPort {
         id: *id,
         kind: port.shape.kind(),
-        width: port.shape.scalars().len(),
+        width: Width::of(&port.shape),
     };
     let ports: Vec<FedPort> = ports.map(port).collect();
-    let widths: Vec<usize> = ports.iter().map(|port| port.width).collect();
+    let widths: Vec<Width> = ports.iter().map(|port| port.width).collect();
     let (tasks, live) = (engine.tasks().len(), engine.live_values().count());
-    // A port that is watched has its number too.
-    let longest = HEAD + 2 * tasks + 2 * live + widths.iter().map(|width| width + 2).sum::<usize>();
-    let (ring, drain) = touched_ring(MIN_WORDS.max(MIN_FRAMES * longest));
+    let words = |is_of_whole: bool| {
+        let widths = widths.iter().filter(|width| width.is_of_whole() == is_of_whole);
+        widths.map(|width| width.words() + PORT_HEAD).sum::<usize>()
+    };
+    let (numbers, images) = (HEAD + tasks * (4 + MAX_REASON / 8) + 2 * live + words(true), words(false));
+    let (ring, drain) = touched_ring(MIN_WORDS.max(MIN_FRAMES * numbers + MIN_IMAGES * images));
     let wishes = Arc::new(Wishes {
         whole: AtomicBool::new(false),
         is_any_watched: AtomicBool::new(false),
         watched: ports.iter().map(|_| AtomicBool::new(false)).collect(),
+        at_once: ports.iter().map(|_| AtomicBool::new(false)).collect(),
         lost: AtomicU64::new(0),
     });
-    let row = vec![0.0; widths.iter().copied().max().unwrap_or(0)];
-    let feed = Feed { ports, row, frame: Vec::with_capacity(longest), ring, wishes: Arc::clone(&wishes) };
-    (feed, FeedReader { widths, tasks, live, ring: drain, frame: Vec::new() }, wishes)
+    let longest = widths.iter().filter(|width| width.is_of_whole()).map(|width| width.words()).max();
+    let feed = Feed {
+        reasons: std::iter::repeat_with(Reason::default).take(tasks).collect(),
+        row: vec![0.0; longest.unwrap_or(0)],
+        frame: Vec::with_capacity(numbers + images),
+        ports,
+        ring,
+        wishes: Arc::clone(&wishes),
+    };
+    (feed, FeedReader::new(widths, [tasks, live], drain), wishes)
 }
 
 impl Feed {
     /// Writes what is wanted of the last tick. Without room in the ring, it is lost. It neither allocates nor waits nor
-    /// calls the operating system.
+    /// calls the operating system; only the reason of a halt that has just begun is allocated.
     pub fn publish(&mut self, engine: &Engine) {
         if self.wishes.whole.load(Ordering::Relaxed) && self.wishes.whole.swap(false, Ordering::Acquire) {
             self.publish_whole(engine);
@@ -168,7 +148,8 @@ impl Feed {
 
     fn begin(&mut self, kind: u64, engine: &Engine) {
         self.frame.clear();
-        self.frame.extend_from_slice(&[0, kind, engine.ticks(), engine.now().cast_unsigned()]);
+        let epoch = engine.began().map_or(0, |began| began.wall - began.time);
+        self.frame.extend_from_slice(&[0, kind, engine.ticks(), engine.now().cast_unsigned(), epoch.cast_unsigned()]);
     }
 
     /// Passes the frame on. Returns whether there was room.
@@ -179,15 +160,26 @@ impl Feed {
 
     fn publish_whole(&mut self, engine: &Engine) {
         self.begin(WHOLE, engine);
-        for task in engine.tasks() {
+        for (task, reason) in engine.tasks().iter().zip(&mut self.reasons) {
             let flags = u64::from(task.is_halted()) | u64::from(task.end().is_some()) << 1;
-            self.frame.extend_from_slice(&[task.mode_number().map_or(NO_MODE, |mode| mode as u64), flags]);
+            let mode = task.mode_number().map_or(NO_MODE, |mode| mode as u64);
+            let halts = task.halts().len() as u64 + task.unlisted_halts();
+            let text = reason.text_of(task);
+            self.frame.extend_from_slice(&[mode, flags, halts, text.len() as u64]);
+            self.frame.extend(text.chunks(8).map(|bytes| {
+                let mut word = [0; 8];
+                word[..bytes.len()].copy_from_slice(bytes);
+                u64::from_le_bytes(word)
+            }));
         }
         for live in engine.live_values() {
             self.frame.extend_from_slice(&[live.value.to_bits(), live.target.to_bits()]);
         }
         for port in 0..self.ports.len() {
-            self.add(port, engine);
+            if self.ports[port].width.is_of_whole() {
+                self.frame.push(u64::from(engine.bus().mark(self.ports[port].id).is_present()));
+                self.add(port, engine);
+            }
         }
         if !self.push() {
             // The next tick tries again.
@@ -198,9 +190,16 @@ impl Feed {
     fn publish_watched(&mut self, engine: &Engine) {
         self.begin(WATCHED, engine);
         for port in 0..self.ports.len() {
-            let is_new = || engine.bus().mark(self.ports[port].id).changed_in(engine.ticks());
-            if self.wishes.watched[port].load(Ordering::Relaxed) && is_new() {
-                self.frame.push(port as u64);
+            if !self.wishes.watched[port].load(Ordering::Relaxed) {
+                continue;
+            }
+            let mark = engine.bus().mark(self.ports[port].id);
+            let at_once = &self.wishes.at_once[port];
+            let is_wanted = at_once.load(Ordering::Relaxed) && at_once.swap(false, Ordering::Acquire);
+            if is_wanted || mark.changed_in(engine.ticks()) {
+                let stamp = mark.stamp();
+                let stamp = if stamp.is_timeless() { engine.now() } else { stamp.nanos };
+                self.frame.extend_from_slice(&[port as u64, u64::from(mark.is_present()), stamp.cast_unsigned()]);
                 self.add(port, engine);
             }
         }
@@ -209,50 +208,43 @@ impl Feed {
         }
     }
 
-    /// Adds whether a port is present, and its numbers.
+    /// Adds the values of a port.
     fn add(&mut self, port: usize, engine: &Engine) {
         let FedPort { id, kind, width } = self.ports[port];
-        let bus = engine.bus();
-        self.frame.push(u64::from(bus.mark(id).is_present()));
-        bus.arenas.read_scalars(kind, id.slot, 0, &mut self.row);
-        self.frame.extend(self.row[..width].iter().map(|number| number.to_bits()));
-    }
-}
-
-impl FeedReader {
-    /// Takes the next frame, if there is one.
-    pub(super) fn next(&mut self) -> Option<Frame> {
-        let length = *self.ring.peek().ok()? as usize;
-        self.frame.resize(length, 0);
-        self.ring.pop_entire_slice(&mut self.frame).ok()?;
-        let [_, kind, tick, now] = *self.frame.first_chunk::<HEAD>()?;
-        let mut words = self.frame[HEAD..].iter().copied();
-        let content = if kind == WATCHED {
-            let mut ports = Vec::new();
-            while let Some(port) = words.next() {
-                let port = port as usize;
-                ports.push((port, take_port(&mut words, *self.widths.get(port)?)?));
+        let arenas = &engine.bus().arenas;
+        match width {
+            Width::Numbers(numbers) => {
+                arenas.read_scalars(kind, id.slot, 0, &mut self.row);
+                self.frame.extend(self.row[..numbers].iter().map(|number| number.to_bits()));
             }
-            Content::Watched(ports)
-        } else {
-            let mut pair = || Some([words.next()?, words.next()?]);
-            let task = |[mode, flags]: [u64; 2]| FedTask {
-                mode: (mode != NO_MODE).then_some(mode as usize),
-                is_halted: flags & 1 != 0,
-                has_ended: flags & 2 != 0,
-            };
-            let tasks = (0..self.tasks).map(|_| pair().map(task)).collect::<Option<_>>()?;
-            let live = (0..self.live).map(|_| pair().map(|both| both.map(f64::from_bits))).collect::<Option<_>>()?;
-            let ports = self.widths.iter().map(|width| take_port(&mut words, *width)).collect::<Option<_>>()?;
-            Content::Whole(Whole { tasks, live, ports })
-        };
-        Some(Frame { tick, now: now.cast_signed(), content })
+            Width::Cells(_) if kind == Kind::VectorImage => {
+                let cells = VectorImage::arena(arenas)[id.slot as usize].cells();
+                extend_with_pairs(&mut self.frame, cells.iter().flatten().copied());
+            }
+            Width::Cells(_) => {
+                let cells = Image::arena(arenas)[id.slot as usize].cells();
+                extend_with_pairs(&mut self.frame, cells.iter().copied());
+            }
+        }
     }
 }
 
-/// Takes the numbers of a port. The outer `None` is a frame that is too short.
-fn take_port(words: &mut impl Iterator<Item = u64>, width: usize) -> Option<Option<Vec<f64>>> {
-    let is_present = words.next()? != 0;
-    let numbers = (0..width).map(|_| words.next().map(f64::from_bits)).collect::<Option<Vec<f64>>>()?;
-    Some(is_present.then_some(numbers))
+impl Reason {
+    /// Returns why the commands of the task are held, or why it has failed.
+    fn text_of(&mut self, task: &TaskRun) -> &[u8] {
+        let of = (task.halts().len(), task.end().is_some());
+        if self.of != of {
+            self.of = of;
+            self.text.clear();
+            // Writing to a string cannot fail.
+            let _ = match (task.end(), task.halts().last()) {
+                (Some(TaskEnd::Failed(fault)), _) => write!(self.text, "{fault}"),
+                (Some(TaskEnd::Done), _) | (None, None) => Ok(()),
+                (None, Some(halt)) => write!(self.text, "{}", halt.fault),
+            };
+            self.text.truncate(self.text.floor_char_boundary(MAX_REASON));
+        }
+        let is_over = task.end().is_none() && task.halts().last().is_none_or(|halt| halt.until.is_some());
+        if is_over { &[] } else { self.text.as_bytes() }
+    }
 }

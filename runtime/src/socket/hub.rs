@@ -5,14 +5,16 @@ use std::fmt::Write;
 use std::rc::Rc;
 use std::sync::Arc;
 use std::sync::mpsc::SyncSender;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use tokio::sync::{Notify, mpsc, oneshot};
 use tokio::time::{sleep, timeout};
 
-use super::asks::WalkAnswer;
+use super::asks::{PortFacts, RunEnd, WalkAnswer};
 use super::described::Described;
-use super::feed::{Content, FeedReader, Frame, Whole, Wishes};
+use super::feed::Wishes;
+use super::follower::Follower;
+use super::frames::{Content, FedValue, FeedReader, Frame, Whole};
 use crate::engine::{ChangeRequest, RunRequests, Walk};
 use crate::record::seconds_text;
 
@@ -22,6 +24,8 @@ const LOOK: Duration = Duration::from_millis(5);
 const MAX_TICK: Duration = Duration::from_secs(2);
 /// Longest wait for the check of a change.
 const MAX_CHECK: Duration = Duration::from_secs(20);
+/// Longest time between two lines of a follower [ms].
+const MAX_PERIOD_MS: f64 = 10_000.0;
 /// Number of samples that wait for a watcher.
 const MAX_WAITING: usize = 256;
 
@@ -36,6 +40,9 @@ pub(super) struct Hub {
     wishes: Arc<Wishes>,
     reader: RefCell<FeedReader>,
     watchers: RefCell<Vec<Watcher>>,
+    followers: RefCell<Vec<Follower>>,
+    /// Time of the last tick that was read, in the graph's clock [ns].
+    now: Cell<i64>,
     waiting: RefCell<Vec<oneshot::Sender<WholeFrame>>>,
     is_wanted: Notify,
     /// Number of clients that have not read all samples.
@@ -76,6 +83,8 @@ impl Hub {
             wishes,
             reader: RefCell::new(reader),
             watchers: RefCell::default(),
+            followers: RefCell::default(),
+            now: Cell::new(0),
             waiting: RefCell::default(),
             is_wanted: Notify::new(),
             watching: Cell::new(0),
@@ -85,7 +94,8 @@ impl Hub {
     /// Reads the ring while something is wanted, for ever.
     pub(super) async fn work(&self) {
         loop {
-            if self.watchers.borrow().is_empty() && self.waiting.borrow().is_empty() {
+            let is_followed = !self.followers.borrow().is_empty();
+            if self.watchers.borrow().is_empty() && self.waiting.borrow().is_empty() && !is_followed {
                 self.is_wanted.notified().await;
             }
             sleep(LOOK).await;
@@ -97,19 +107,25 @@ impl Hub {
     pub(super) fn drain(&self) {
         while let Some(frame) = self.next_frame() {
             match frame {
-                Frame { content: Content::Whole(whole), tick, now } => {
-                    let frame = Frame { tick, now, content: Content::Watched(Vec::new()) };
+                Frame { content: Content::Whole(whole), tick, now, epoch } => {
+                    let frame = Frame { tick, now, epoch, content: Content::Watched(Vec::new()) };
                     let both = Rc::new((frame, whole));
                     for waiting in self.waiting.borrow_mut().drain(..) {
                         // Who waits no longer needs no answer.
                         let _ = waiting.send(Rc::clone(&both));
                     }
                 }
-                Frame { content: Content::Watched(ports), now, .. } => self.send_sample(now, &ports),
+                Frame { content: Content::Watched(values), now, epoch, .. } => {
+                    self.now.set(now);
+                    self.send_sample(now, &values);
+                    self.followers.borrow_mut().iter_mut().for_each(|follower| follower.take(epoch, &values));
+                }
             }
         }
         let lost = self.wishes.take_lost();
         self.watchers.borrow_mut().iter_mut().for_each(|watcher| watcher.lost += lost);
+        let (at, now) = (Instant::now(), self.now.get());
+        self.followers.borrow_mut().iter_mut().for_each(|follower| follower.send(at, now));
         self.forget(|watcher| watcher.queue.is_closed() || watcher.left == Some(0));
     }
 
@@ -117,12 +133,12 @@ impl Hub {
         self.reader.borrow_mut().next()
     }
 
-    fn send_sample(&self, now: i64, ports: &[(usize, Option<Vec<f64>>)]) {
+    fn send_sample(&self, now: i64, values: &[FedValue]) {
         for watcher in self.watchers.borrow_mut().iter_mut().filter(|watcher| watcher.left != Some(0)) {
             let new = watcher.columns.iter().filter_map(|(column, name)| {
                 let column = &self.described.columns[*column];
-                let (_, row) = ports.iter().find(|(port, _)| *port == column.port)?;
-                Some((name.as_str(), row.as_ref().and_then(|row| row.get(column.index)).copied()))
+                let value = values.iter().find(|value| value.port == column.port)?;
+                Some((name.as_str(), value.row.as_ref().and_then(|row| row.number(column.index))))
             });
             let new: Vec<(&str, Option<f64>)> = new.collect();
             if new.is_empty() {
@@ -138,20 +154,22 @@ impl Hub {
         }
     }
 
-    /// Removes watchers. Their queues end.
+    /// Removes watchers, and followers that are gone. Their queues end.
     fn forget(&self, is_gone: impl Fn(&Watcher) -> bool) {
-        let mut watchers = self.watchers.borrow_mut();
-        let before = watchers.len();
+        let (mut watchers, mut followers) = (self.watchers.borrow_mut(), self.followers.borrow_mut());
+        let before = watchers.len() + followers.len();
         watchers.retain(|watcher| !is_gone(watcher));
-        if watchers.len() != before {
-            self.wish(&watchers);
+        followers.retain(|follower| !follower.is_gone());
+        if watchers.len() + followers.len() != before {
+            self.wish(&watchers, &followers);
         }
     }
 
     /// Sets which ports the tick writes.
-    fn wish(&self, watchers: &[Watcher]) {
+    fn wish(&self, watchers: &[Watcher], followers: &[Follower]) {
         let columns = || watchers.iter().flat_map(|watcher| &watcher.columns);
-        self.wishes.watch(|port| columns().any(|(column, _)| self.described.columns[*column].port == port));
+        let is_watched = |port| columns().any(|(column, _)| self.described.columns[*column].port == port);
+        self.wishes.watch(|port| is_watched(port) || followers.iter().any(|follower| follower.follows(port)));
     }
 
     /// Returns the values of the next tick.
@@ -223,9 +241,29 @@ impl Hub {
         let (queue, receiver) = mpsc::channel(MAX_WAITING);
         let mut watchers = self.watchers.borrow_mut();
         watchers.push(Watcher { columns, queue, lost: 0, left: count });
-        self.wish(&watchers);
+        self.wish(&watchers, &self.followers.borrow());
         self.is_wanted.notify_one();
         Ok(receiver)
+    }
+
+    /// Adds a follower. Returns what does not change of its ports, and its queue.
+    pub(super) fn follow(
+        &self,
+        ports: &[String],
+        period_ms: f64,
+    ) -> Result<(Vec<PortFacts>, mpsc::Receiver<String>), String> {
+        if !(0.0..=MAX_PERIOD_MS).contains(&period_ms) {
+            return Err(format!("`period_ms` must be from 0 to {MAX_PERIOD_MS}"));
+        }
+        let found = self.described.find_ports(ports)?;
+        let names = found.iter().map(|(port, facts)| (*port, facts.name.clone())).collect();
+        let (follower, lines) = Follower::new(names, Duration::from_secs_f64(period_ms * 1e-3));
+        let mut followers = self.followers.borrow_mut();
+        followers.push(follower);
+        self.wish(&self.watchers.borrow(), &followers);
+        found.keys().for_each(|port| self.wishes.want_at_once(*port));
+        self.is_wanted.notify_one();
+        Ok((found.into_values().collect(), lines))
     }
 
     /// Counts a client until it has read all samples.
@@ -239,9 +277,10 @@ impl Hub {
         self.watching.get() > 0
     }
 
-    /// Passes on what is left of a run that has ended, and ends all queues.
-    pub(super) fn end(&self) {
+    /// Passes on what is left of a run that has ended, and ends all queues. Followers get how it has ended.
+    pub(super) fn end(&self, end: Option<&RunEnd>) {
         self.drain();
+        self.followers.borrow_mut().drain(..).for_each(|follower| follower.end(self.now.get(), end));
         self.forget(|_| true);
         self.waiting.borrow_mut().clear();
     }

@@ -10,14 +10,18 @@ mod client;
 mod described;
 mod feed;
 mod folder;
+mod follower;
+mod frames;
 mod hub;
 mod lines;
 mod server;
 
+pub use asks::{About, Followed, ImageFacts, PortFacts, PortSample, RunEnd, TaskState};
+pub use client::Following;
 pub use described::RunFacts;
 pub use feed::Feed;
 pub use server::{OpenedSocket, RunSocket, open};
 
-pub(crate) use asks::{About, Ask, Got, LiveState, Origin, PortState, TaskState, WalkAnswer};
+pub(crate) use asks::{Ask, Got, LiveState, Origin, PortState, WalkAnswer};
 pub(crate) use client::{Client, Sample};
 pub(crate) use folder::sockets;

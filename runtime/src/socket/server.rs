@@ -14,14 +14,15 @@ use serde::Serialize;
 use tokio::io::{AsyncReadExt, AsyncWriteExt, BufReader};
 use tokio::net::UnixListener;
 use tokio::net::unix::{OwnedReadHalf, OwnedWriteHalf};
-use tokio::sync::{Semaphore, oneshot};
+use tokio::sync::{Semaphore, mpsc, oneshot};
 use tokio::task::LocalSet;
 use tokio::time::{sleep, timeout};
 
-use super::asks::{Answer, Ask};
+use super::asks::{Answer, Ask, RunEnd};
 use super::described::{Described, RunFacts};
-use super::feed::{Feed, FeedReader, Wishes, feed};
+use super::feed::{Feed, Wishes, feed};
 use super::folder::bind;
+use super::frames::FeedReader;
 use super::hub::Hub;
 use super::lines::{Line, MAX_LINE, read_line};
 use crate::engine::{ChangeRequest, Engine, RunRequests};
@@ -50,7 +51,8 @@ const LAST: Duration = Duration::from_millis(200);
 /// The socket of a run. It is closed when it is dropped.
 pub struct RunSocket {
     thread: Option<JoinHandle<()>>,
-    end: Option<oneshot::Sender<()>>,
+    over: Option<oneshot::Sender<Option<RunEnd>>>,
+    end: Option<RunEnd>,
     path: PathBuf,
 }
 
@@ -87,15 +89,15 @@ pub fn open(engine: &Engine, facts: RunFacts) -> Result<OpenedSocket, String> {
     let facts = Described::of(engine, facts);
     let shared =
         Shared { listener, facts, ring: (wishes, reader), requests: Arc::clone(&requests), changes: requested };
-    let (end, ended) = oneshot::channel();
+    let (over, is_over) = oneshot::channel();
     let work = move || {
-        if let Err(error) = serve(shared, ended) {
+        if let Err(error) = serve(shared, is_over) {
             tracing::warn!("the socket of the run is closed: {error}");
         }
     };
     let thread = std::thread::Builder::new().name("socket".into()).spawn(work);
     // From here on, the file is removed at the end.
-    let mut socket = RunSocket { thread: None, end: Some(end), path };
+    let mut socket = RunSocket { thread: None, over: Some(over), end: None, path };
     socket.thread = Some(thread.map_err(|error| format!("cannot start a thread: {error}"))?);
     Ok(OpenedSocket { socket, feed, requests, changes })
 }
@@ -106,13 +108,21 @@ impl RunSocket {
     pub fn path(&self) -> &Path {
         &self.path
     }
+
+    /// Notes how the run has ended, for those who follow it.
+    pub fn end(&mut self, reason: String, is_fault: bool) {
+        self.end = Some(RunEnd { reason, is_fault });
+    }
 }
 
 impl Drop for RunSocket {
     fn drop(&mut self) {
         // It may be gone with the folder.
         let _ = std::fs::remove_file(&self.path);
-        drop(self.end.take());
+        if let Some(over) = self.over.take() {
+            // The thread has ended before if its socket failed.
+            let _ = over.send(self.end.take());
+        }
         if let Some(thread) = self.thread.take() {
             // A panic of the thread was printed when it happened.
             let _ = thread.join();
@@ -121,7 +131,7 @@ impl Drop for RunSocket {
 }
 
 /// Serves clients until the run is over.
-fn serve(shared: Shared, over: oneshot::Receiver<()>) -> io::Result<()> {
+fn serve(shared: Shared, over: oneshot::Receiver<Option<RunEnd>>) -> io::Result<()> {
     let runtime = tokio::runtime::Builder::new_current_thread().enable_io().enable_time().build()?;
     LocalSet::new().block_on(&runtime, async move {
         let listener = UnixListener::from_std(shared.listener)?;
@@ -129,11 +139,11 @@ fn serve(shared: Shared, over: oneshot::Receiver<()>) -> io::Result<()> {
         let worker = Rc::clone(&hub);
         tokio::task::spawn_local(async move { worker.work().await });
         let places = [MAX_CLIENTS, MAX_STOPPING].map(|places| Arc::new(Semaphore::new(places)));
-        tokio::select! {
-            () = accept(&listener, &hub, &places) => {}
-            _ = over => {}
-        }
-        hub.end();
+        let end = tokio::select! {
+            () = accept(&listener, &hub, &places) => None,
+            end = over => end.ok().flatten(),
+        };
+        hub.end(end.as_ref());
         let is_read = async {
             while hub.is_watched() {
                 sleep(REST).await;
@@ -217,30 +227,32 @@ async fn talk(read: OwnedReadHalf, write: &mut OwnedWriteHalf, hub: &Hub) -> io:
             Ok(Ask::Set { values }) => answer(write, hub.set(values.into_iter().collect()).await).await?,
             Ok(Ask::Send { word }) => answer(write, hub.send(&word)).await?,
             Ok(Ask::Tare {}) => answer(write, hub.tare().await).await?,
-            Ok(Ask::Watch { ports, count }) => return watch(&ports, count, &mut reader, write, hub).await,
+            Ok(Ask::Watch { ports, count }) => match hub.watch(&ports, count) {
+                Ok(lines) => return stream((), lines, (&mut reader, write), hub).await,
+                Err(why) => return answer::<()>(write, Err(why)).await,
+            },
+            Ok(Ask::Follow { ports, period_ms }) => match hub.follow(&ports, period_ms) {
+                Ok((facts, lines)) => return stream(facts, lines, (&mut reader, write), hub).await,
+                Err(why) => return answer::<()>(write, Err(why)).await,
+            },
         }
         sleep(PAUSE).await;
     }
 }
 
-/// Sends samples until their number is reached, the client sends something or goes, or the run ends.
-async fn watch(
-    ports: &[String],
-    count: Option<u64>,
-    reader: &mut BufReader<OwnedReadHalf>,
-    write: &mut OwnedWriteHalf,
+/// Answers, and sends lines until there are no more, the client sends something or goes, or the run ends.
+async fn stream<T: Serialize>(
+    first: T,
+    mut lines: mpsc::Receiver<String>,
+    (reader, write): (&mut BufReader<OwnedReadHalf>, &mut OwnedWriteHalf),
     hub: &Hub,
 ) -> io::Result<()> {
-    let mut queue = match hub.watch(ports, count) {
-        Ok(queue) => queue,
-        Err(why) => return answer::<()>(write, Err(why)).await,
-    };
     let _watching = hub.begin_watching();
-    answer(write, Ok(())).await?;
+    answer(write, Ok(first)).await?;
     loop {
         let mut byte = [0];
         tokio::select! {
-            line = queue.recv() => match line {
+            line = lines.recv() => match line {
                 Some(line) => write.write_all(line.as_bytes()).await?,
                 None => return Ok(()),
             },

@@ -142,3 +142,62 @@ class JointTrajectory(IdlStruct, typename=_type("trajectory_msgs", "JointTraject
 @dataclass
 class String(IdlStruct, typename=_type("std_msgs", "String")):
     data: str = ""
+
+
+@dataclass
+class Quaternion(IdlStruct, typename=_type("geometry_msgs", "Quaternion")):
+    x: float64 = 0.0
+    y: float64 = 0.0
+    z: float64 = 0.0
+    w: float64 = 1.0
+
+
+@dataclass
+class Pose(IdlStruct, typename=_type("geometry_msgs", "Pose")):
+    position: Vector3 = field(default_factory=Vector3)
+    orientation: Quaternion = field(default_factory=Quaternion)
+
+
+@dataclass
+class PoseStamped(IdlStruct, typename=_type("geometry_msgs", "PoseStamped")):
+    header: Header = field(default_factory=Header)
+    pose: Pose = field(default_factory=Pose)
+
+
+@dataclass
+class Transform(IdlStruct, typename=_type("geometry_msgs", "Transform")):
+    translation: Vector3 = field(default_factory=Vector3)
+    rotation: Quaternion = field(default_factory=Quaternion)
+
+
+@dataclass
+class TransformStamped(IdlStruct, typename=_type("geometry_msgs", "TransformStamped")):
+    header: Header = field(default_factory=Header)
+    child_frame_id: str = ""
+    transform: Transform = field(default_factory=Transform)
+
+
+@dataclass
+class TFMessage(IdlStruct, typename=_type("tf2_msgs", "TFMessage")):
+    transforms: sequence[TransformStamped] = field(default_factory=list)
+
+
+@dataclass
+class KeyValue(IdlStruct, typename=_type("diagnostic_msgs", "KeyValue")):
+    key: str = ""
+    value: str = ""
+
+
+@dataclass
+class DiagnosticStatus(IdlStruct, typename=_type("diagnostic_msgs", "DiagnosticStatus")):
+    level: uint8 = 0
+    name: str = ""
+    message: str = ""
+    hardware_id: str = ""
+    values: sequence[KeyValue] = field(default_factory=list)
+
+
+@dataclass
+class DiagnosticArray(IdlStruct, typename=_type("diagnostic_msgs", "DiagnosticArray")):
+    header: Header = field(default_factory=Header)
+    status: sequence[DiagnosticStatus] = field(default_factory=list)

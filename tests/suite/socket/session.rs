@@ -12,38 +12,38 @@ use tempfile::TempDir;
 use crate::tool::{Said, said, tool};
 
 /// Longest wait for a process or an answer.
-pub(super) const PATIENCE: Duration = Duration::from_secs(20);
+pub(crate) const PATIENCE: Duration = Duration::from_secs(20);
 
 /// A user's session: the folder of the sockets, and the graphs that run.
-pub(super) struct Session {
-    pub(super) folder: TempDir,
-    pub(super) runs: Vec<Child>,
+pub(crate) struct Session {
+    pub(crate) folder: TempDir,
+    pub(crate) runs: Vec<Child>,
 }
 
 impl Session {
-    pub(super) fn new() -> Self {
+    pub(crate) fn new() -> Self {
         Self { folder: tempfile::tempdir().unwrap(), runs: Vec::new() }
     }
 
-    pub(super) fn tool(&self, args: &[&str]) -> Command {
+    pub(crate) fn tool(&self, args: &[&str]) -> Command {
         let mut command = tool(args);
         command.env("XDG_RUNTIME_DIR", self.folder.path());
         command
     }
 
-    pub(super) fn say(&self, args: &[&str]) -> Said {
+    pub(crate) fn say(&self, args: &[&str]) -> Said {
         said(&mut self.tool(args))
     }
 
     /// Runs a command that must succeed, and returns what it prints.
-    pub(super) fn print(&self, args: &[&str]) -> String {
+    pub(crate) fn print(&self, args: &[&str]) -> String {
         let said = self.say(args);
         assert_eq!(said.code, 0, "{args:?}: {}{}", said.out, said.err);
         said.out
     }
 
     /// Starts a graph in real time, and waits for its socket. Returns the number of its process.
-    pub(super) fn run(&mut self, args: &[&str]) -> u32 {
+    pub(crate) fn run(&mut self, args: &[&str]) -> u32 {
         let mut command = self.tool(&[&["run"], args, &["--realtime"]].concat());
         let child = command.stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
         let pid = child.id();
@@ -52,25 +52,25 @@ impl Session {
         pid
     }
 
-    pub(super) fn socket(&self, pid: u32) -> PathBuf {
+    pub(crate) fn socket(&self, pid: u32) -> PathBuf {
         self.folder.path().join(format!("tactflow/{pid}.sock"))
     }
 
     /// Ends the first graph as Ctrl-C does, and returns what it has said.
-    pub(super) fn end(&mut self) -> Said {
+    pub(crate) fn end(&mut self) -> Said {
         let child = self.runs.remove(0);
         let pid = nix::unistd::Pid::from_raw(child.id().try_into().unwrap());
         nix::sys::signal::kill(pid, nix::sys::signal::Signal::SIGINT).unwrap();
         finish(child)
     }
 
-    pub(super) fn connect(&self, pid: u32) -> BufReader<UnixStream> {
+    pub(crate) fn connect(&self, pid: u32) -> BufReader<UnixStream> {
         let stream = UnixStream::connect(self.socket(pid)).unwrap();
         stream.set_read_timeout(Some(PATIENCE)).unwrap();
         BufReader::new(stream)
     }
 
-    pub(super) fn about(&self) -> Value {
+    pub(crate) fn about(&self) -> Value {
         let all: Value = serde_json::from_str(&self.print(&["ps", "--format", "json"])).unwrap();
         all[0].clone()
     }
@@ -85,13 +85,13 @@ impl Drop for Session {
     }
 }
 
-pub(super) fn finish(child: Child) -> Said {
+pub(crate) fn finish(child: Child) -> Said {
     let output = child.wait_with_output().unwrap();
     let text = |bytes: Vec<u8>| String::from_utf8(bytes).unwrap();
     Said { code: output.status.code().unwrap_or(-1), out: text(output.stdout), err: text(output.stderr) }
 }
 
-pub(super) fn wait_for<T>(mut look: impl FnMut() -> Option<T>, what: &str) -> T {
+pub(crate) fn wait_for<T>(mut look: impl FnMut() -> Option<T>, what: &str) -> T {
     let begin = Instant::now();
     loop {
         if let Some(found) = look() {

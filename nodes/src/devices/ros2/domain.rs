@@ -20,6 +20,10 @@ use super::message::{Message, dds_type, ros_type};
 /// Highest number of a domain whose ports exist on every system.
 pub(super) const MAX_DOMAIN: usize = 101;
 
+/// Depth of a topic that others see.
+#[cfg(all(feature = "cli", unix))]
+const SHOWN_DEPTH: i32 = 10;
+
 /// Number of writers of a topic whose types are remembered.
 const MAX_TRUSTED: usize = 16;
 
@@ -66,7 +70,7 @@ pub(super) fn domain_of(given: Option<usize>) -> Result<u16, String> {
         Ok(text) if text.is_empty() => Ok(0),
         Ok(text) => text.parse().ok().filter(|id| usize::from(*id) <= MAX_DOMAIN).ok_or_else(|| {
             format!(
-                "ROS_DOMAIN_ID is `{text}`, and not a number from 0 to {MAX_DOMAIN}; `domain` of the bench replaces it"
+                "ROS_DOMAIN_ID is `{text}`, and not a number from 0 to {MAX_DOMAIN}; `domain` of the bench, or `--domain`, replaces it"
             )
         }),
     }
@@ -76,8 +80,11 @@ impl Domain {
     /// Joins a domain over the network interface with an address.
     ///
     /// # Errors
-    /// If the sockets cannot be opened.
+    /// If the sockets cannot be opened, or this machine does not have the address.
     pub(super) fn join(id: u16, network: IpAddr) -> Result<Self, String> {
+        // The library would join without an interface, and hear nothing.
+        std::net::UdpSocket::bind((network, 0))
+            .map_err(|error| format!("this machine has no address {network} (`network`): {error}"))?;
         let failed = |error: &dyn std::fmt::Debug| format!("cannot join the domain {id} over {network}: {error:?}");
         let participant = DomainParticipantBuilder::new(id).with_only_networks([network]).build();
         let participant = participant.map_err(|error| failed(&error))?;
@@ -101,14 +108,19 @@ impl Domain {
         Ok(Reader { messages, participant: self.participant.clone(), trusted: Vec::new() })
     }
 
-    /// Writes a topic: reliable, the newest message only, and none that is older than `lifespan`.
+    /// Writes a topic of commands: reliable, the newest message only, and none that is older than `lifespan`.
     pub(super) fn write<M: Message>(&self, name: &str, lifespan: Duration) -> Result<Writer<M>, String> {
-        let qos = QosPolicyBuilder::new()
-            .reliability(Reliability::Reliable { max_blocking_time: rustdds::Duration::ZERO })
-            .durability(Durability::Volatile)
-            .history(History::KeepLast { depth: 1 })
-            .lifespan(Lifespan { duration: lifespan.into() })
-            .build();
+        self.writer(name, &reliable(1).lifespan(Lifespan { duration: lifespan.into() }).build())
+    }
+
+    /// Writes a topic that others see: reliable, which a best-effort reader takes too, and the last messages.
+    #[cfg(all(feature = "cli", unix))]
+    pub(super) fn show<M: Message>(&self, name: &str) -> Result<Writer<M>, String> {
+        self.writer(name, &reliable(SHOWN_DEPTH).build())
+    }
+
+    fn writer<M: Message>(&self, name: &str, qos: &QosPolicies) -> Result<Writer<M>, String> {
+        let qos = qos.clone();
         let topic = self.topic::<M>(name, &qos)?;
         let writer = self.publisher.create_datawriter_no_key(&topic, None);
         writer.map(|writer| Writer { writer, readers: 0, refused: None }).map_err(|error| refused(name, &error))
@@ -226,6 +238,13 @@ impl<M: Message> Writer<M> {
         self.writer.write(message, None).is_ok()
     }
 
+    /// Waits until those who read reliably have all messages, but not longer than `patience`.
+    #[cfg(all(feature = "cli", unix))]
+    pub(super) fn settle(&self, patience: Duration) {
+        // Who has not got them until then does not read.
+        let _ = self.writer.wait_for_acknowledgments(patience);
+    }
+
     /// Says why nobody gets the messages; `None` if somebody does.
     pub(super) fn why_unread(&mut self, domain: &Domain, name: &str) -> Option<String> {
         while let Some(status) = self.writer.try_recv_status() {
@@ -251,6 +270,14 @@ impl<M: Message> Writer<M> {
             (None, _) => format!("nobody reads `{name}` {}", domain.neighbours()),
         })
     }
+}
+
+/// A quality of service that never waits for a reader.
+fn reliable(depth: i32) -> QosPolicyBuilder {
+    QosPolicyBuilder::new()
+        .reliability(Reliability::Reliable { max_blocking_time: rustdds::Duration::ZERO })
+        .durability(Durability::Volatile)
+        .history(History::KeepLast { depth })
 }
 
 /// Returns the name of a topic on the wire of DDS.

@@ -169,6 +169,9 @@ impl Session {
         if let Some(name) = self.arm.names.iter().find(missing) {
             return Err(format!("`{states}` lacks the joint `{name}`; it has `{}`", names.join("`, `")));
         }
+        if let Some(name) = self.arm.names.iter().find(|ours| names.iter().filter(|name| name == ours).count() > 1) {
+            return Err(format!("`{states}` has the joint `{name}` more than once in a message"));
+        }
         for (name, position) in names.iter().zip(&message.position) {
             if let Some(i) = self.arm.names.iter().position(|ours| ours == name) {
                 self.position[i] = *position;

@@ -51,16 +51,19 @@ impl Site {
 /// # Errors
 /// What a name consists of, at the parameter.
 pub(super) fn check_topic(param: &str, name: &str) -> Result<(), Mistakes> {
-    let is_part = |part: &str| {
-        part.chars().all(|c| c.is_ascii_alphanumeric() || c == '_') && part.starts_with(|c: char| !c.is_ascii_digit())
-    };
-    let is_topic = name.strip_prefix('/').is_some_and(|rest| rest.split('/').all(is_part));
-    if is_topic {
+    if is_topic(name) {
         return Ok(());
     }
     let message = format!("`{name}` is no name of a topic: it begins with `/`, and has letters, digits and `_`");
     let with_slash = format!("/{name}");
     let mistake = Mistake::param(param, message);
-    let is_relative = with_slash[1..].split('/').all(is_part);
-    Err(if is_relative { mistake.help(format!("write `\"{with_slash}\"`")) } else { mistake }.into())
+    Err(if is_topic(&with_slash) { mistake.help(format!("write `\"{with_slash}\"`")) } else { mistake }.into())
+}
+
+/// Whether a text is the absolute name of a topic.
+pub(super) fn is_topic(name: &str) -> bool {
+    let is_part = |part: &str| {
+        part.chars().all(|c| c.is_ascii_alphanumeric() || c == '_') && part.starts_with(|c: char| !c.is_ascii_digit())
+    };
+    name.strip_prefix('/').is_some_and(|rest| rest.split('/').all(is_part))
 }

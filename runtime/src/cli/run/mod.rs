@@ -277,7 +277,9 @@ impl Job {
                 None => engine::run(&mut engine, &options, &mut observe),
             }
         });
-        drop(socket);
+        if let Some(socket) = socket {
+            socket.close(&outcome);
+        }
         shell.set_patience(&patience.after_run());
         files.end(&engine, &outcome);
         progress.clear();

@@ -2,7 +2,9 @@
 
 use super::Job;
 use crate::cli::shell::Shell;
-use crate::engine::{Changer, Engine, RunOptions, ScheduledChanges};
+#[cfg(unix)]
+use crate::engine::End;
+use crate::engine::{Changer, Engine, Outcome, RunOptions, ScheduledChanges};
 use crate::graph::{Compiled, Request, compile};
 #[cfg(unix)]
 use crate::socket::{Feed, OpenedSocket, RunFacts, RunSocket, open};
@@ -16,7 +18,7 @@ pub(crate) struct Outside<'s> {
 /// An open socket, and the end of its ring in the tick. It is closed when it is dropped.
 pub(crate) struct OpenSocket {
     #[cfg(unix)]
-    _socket: RunSocket,
+    socket: RunSocket,
     #[cfg(unix)]
     feed: Feed,
 }
@@ -77,7 +79,7 @@ impl<'s> Outside<'s> {
             Ok(OpenedSocket { socket, feed, requests, changes: wanted }) => {
                 options.requests = Some(requests);
                 let changes = changes.map(|changes| changes.with_requests(wanted));
-                Self { changes, socket: Some(OpenSocket { _socket: socket, feed }) }
+                Self { changes, socket: Some(OpenSocket { socket, feed }) }
             }
             Err(why) => {
                 shell.warning(format_args!(
@@ -107,5 +109,17 @@ impl OpenSocket {
         self.feed.publish(engine);
         #[cfg(not(unix))]
         let _ = engine;
+    }
+
+    /// Says to others how the run has ended, and closes the socket.
+    #[cfg_attr(not(unix), allow(unused_mut, reason = "there is nobody to say it to"))]
+    pub(crate) fn close(mut self, outcome: &std::io::Result<Outcome>) {
+        #[cfg(unix)]
+        match outcome {
+            Ok(outcome) => self.socket.end(outcome.end.to_string(), matches!(outcome.end, End::Fault(_))),
+            Err(error) => self.socket.end(error.to_string(), true),
+        }
+        #[cfg(not(unix))]
+        let _ = outcome;
     }
 }

@@ -12,7 +12,7 @@ use std::path::{Path, PathBuf};
 
 use super::shell::command::{Subcommand, derived};
 use super::text::number::count_of;
-use crate::socket::{About, Ask, Client, sockets};
+use crate::socket::{About, Ask, Client, Following, sockets};
 
 /// Returns the commands.
 pub(super) fn commands() -> [Subcommand; 6] {
@@ -26,9 +26,9 @@ pub(super) fn commands() -> [Subcommand; 6] {
     ]
 }
 
-/// Which run is meant.
-#[derive(clap::Args)]
-struct RunArg {
+/// Which run is meant: an argument that commands share.
+#[derive(Debug, clap::Args)]
+pub struct RunArg {
     /// The run, by the number of its process or the name of its graph; needed only if several graphs run
     #[arg(long, value_name = "PID|GRAPH")]
     run: Option<String>,
@@ -60,21 +60,75 @@ fn running() -> Result<Vec<Running>, String> {
 const NO_RUN: &str =
     "no graph runs in real time\nhelp: start one in another terminal, for example `tactflow run GRAPH --realtime`";
 
+/// Why no run is found.
+#[derive(Debug)]
+pub struct NotFound {
+    /// What to print.
+    pub message: String,
+    /// Whether it can be found later, when it has begun.
+    pub may_begin: bool,
+}
+
+/// A run in another process.
+pub struct FoundRun {
+    path: PathBuf,
+    client: Client,
+}
+
 impl RunArg {
+    /// Finds the run that is meant.
+    ///
+    /// # Errors
+    /// If none runs, or it is not clear which one is meant.
+    pub fn find(&self) -> Result<FoundRun, NotFound> {
+        let failed = |message| NotFound { message, may_begin: false };
+        let all = running().map_err(failed)?;
+        let is_meant = |run: &&Running| self.run.as_ref().is_none_or(|name| run.is_called(name));
+        let meant: Vec<&Running> = all.iter().filter(is_meant).collect();
+        match meant[..] {
+            // It may have ended since.
+            [run] => Client::connect(&run.path)
+                .map(|client| FoundRun { path: run.path.clone(), client })
+                .map_err(|message| NotFound { message, may_begin: true }),
+            [] => {
+                let name = self.run.as_deref().unwrap_or_default();
+                let others = || format!("no graph `{name}` runs\n{}", list(&all));
+                let message = if all.is_empty() { NO_RUN.to_owned() } else { others() };
+                Err(NotFound { message, may_begin: true })
+            }
+            _ => Err(failed(format!("it is not clear which run is meant\n{}", list(&meant)))),
+        }
+    }
+
     /// Connects to the run that is meant.
     ///
     /// # Errors
     /// If none runs, or it is not clear which one is meant.
     fn connect(&self) -> Result<Client, String> {
-        let all = running()?;
-        let is_meant = |run: &&Running| self.run.as_ref().is_none_or(|name| run.is_called(name));
-        let meant: Vec<&Running> = all.iter().filter(is_meant).collect();
-        match meant[..] {
-            [run] => Client::connect(&run.path),
-            [] if all.is_empty() => Err(NO_RUN.into()),
-            [] => Err(format!("no graph `{}` runs\n{}", self.run.as_deref().unwrap_or_default(), list(&all))),
-            _ => Err(format!("it is not clear which run is meant\n{}", list(&meant))),
+        self.find().map(|run| run.client).map_err(|error| error.message)
+    }
+}
+
+impl FoundRun {
+    /// Asks for its state.
+    ///
+    /// # Errors
+    /// If it does not answer.
+    pub fn about(&mut self) -> Result<About, String> {
+        let about = self.client.ask(&Ask::About {});
+        if about.is_err() {
+            // An answer that comes too late would be taken for that of the next request.
+            self.client = Client::connect(&self.path)?;
         }
+        about
+    }
+
+    /// Follows the ports that names and patterns mean, with at least `period_ms` between two values of a port.
+    ///
+    /// # Errors
+    /// If a name means no port, or the run does not answer.
+    pub fn follow(&self, ports: Vec<String>, period_ms: f64) -> Result<Following, String> {
+        Following::begin(&self.path, ports, period_ms)
     }
 }
 
