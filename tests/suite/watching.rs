@@ -210,6 +210,17 @@ fn an_arm_gets_another_graph_only_halted_and_the_graph_begins_halted() {
 }
 
 #[test]
+fn a_graph_that_is_mended_begins_halted_too() {
+    let mut watched = Watched::start_with(&hybrid().replace("kp = 3.5", "kpp = 3.5"), &REALTIME);
+    watched.wait("err", "waiting until a file of the graph is saved", 1);
+    watched.save(&hybrid());
+    watched.wait("err", "nothing moves before `resume` is typed", 1);
+    sleep(Duration::from_millis(700));
+    assert_eq!(watched.end(), Some(0), "{}", watched.text("err"));
+    assert!(ways(&watched, "run-2.csv").iter().all(|(_, way)| *way < 0.001));
+}
+
+#[test]
 fn an_arm_in_contact_keeps_its_graph() {
     let mut watched = Watched::start_with(&hybrid(), &REALTIME);
     watched.wait("out", "one tick every", 1);

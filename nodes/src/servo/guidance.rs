@@ -16,10 +16,9 @@ const NAMES: [&str; 6] = ["vx", "vy", "vz", "wx", "wy", "wz"];
 /// is too fast is scaled down as a whole, so its direction stays. Choose the components that may be guided with a
 /// `projector` behind it: those that the controller does not need.
 ///
-/// State the greatest age of the velocity on its wire, `in.velocity = { from = "joystick.velocity", max_age_ms = 200 }`, and
-/// let the policy of the role count, so that the task goes on without a guide: `roles.joystick = { stale = "count" }`. When
-/// the guide is silent for so long, or a component is missing, the output is absent, and `bumpless` brings the motion to zero
-/// smoothly.
+/// When the velocity is older than `max_age_ms`, because the guide is silent, or when a component is missing, the output is
+/// absent, and `bumpless` brings the motion to zero smoothly. Let the policy of the role count, so that the task goes on
+/// without a guide: `roles.joystick = { stale = "count" }`.
 ///
 /// With `in.gate`, the sensor is guided only while that flag is present and set. Without it, only the `blind_limit` bounds
 /// the motion through the air.
@@ -37,6 +36,8 @@ const NAMES: [&str; 6] = ["vx", "vy", "vz", "wx", "wy", "wz"];
 pub struct Guidance {
     /// Greatest linear and angular speed [m/s, rad/s].
     speeds: [f64; 2],
+    /// Greatest age of the velocity [ns].
+    max_age: i64,
     is_gated: bool,
 }
 
@@ -49,6 +50,9 @@ pub struct Params {
     /// Greatest angular speed.
     #[param(unit = "rad/s", range = 0.0.., usual = ..=USUAL_RAD_PER_S)]
     angular_rad_per_s: f64,
+    /// Greatest age of the velocity.
+    #[param(unit = "ms", range = 1.0..=10_000.0, default = 200.0)]
+    max_age_ms: f64,
     /// Frame of the velocity. Without it, the frame follows from the wires.
     frame: Option<String>,
 }
@@ -90,12 +94,14 @@ impl Node for Guidance {
         }
         setup.outputs.share = ScalarShape::of(Unit::ONE).within(0.0, 1.0);
         let speeds = [params.linear_m_per_s, params.angular_rad_per_s];
-        Ok(Self { speeds, is_gated: setup.inputs.gate.is_some() })
+        let max_age = (params.max_age_ms * 1e6) as i64;
+        Ok(Self { speeds, max_age, is_gated: setup.inputs.gate.is_some() })
     }
 
-    fn step(&self, _: &Tick, inputs: Inputs<'_>, out: &mut Outputs, (): &mut ()) {
+    fn step(&self, tick: &Tick, inputs: Inputs<'_>, out: &mut Outputs, (): &mut ()) {
         let is_open = !self.is_gated || inputs.gate.is_some_and(|gate| *gate);
-        let Some(wanted) = whole(&inputs.velocity).filter(|_| is_open) else { return };
+        let is_old = tick.now.saturating_sub(inputs.velocity.stamp().nanos) > self.max_age;
+        let Some(wanted) = whole(&inputs.velocity).filter(|_| is_open && !is_old) else { return };
         let wanted = countable(&wanted);
         let share = scale_twist(&wanted, self.speeds[0], self.speeds[1]);
         out.twist.set(Twist(wanted.0 * share));
@@ -185,6 +191,20 @@ mod tests {
             rig.step();
             assert_eq!(rig.freshness("twist"), expected, "{what}");
         }
+    }
+
+    #[test]
+    fn an_old_velocity_moves_nothing() {
+        let mut rig = rig(&[]);
+        set(&mut rig, &[0.01, 0.0, 0.0, 0.0, 0.0, 0.0].map(Some));
+        rig.step();
+        let mut silent = 0.0;
+        while rig.get::<Twist>("twist").is_some() {
+            rig.step_ms(4.0);
+            silent += 4.0;
+            assert!(silent < 300.0, "the guide is silent, and the sensor moves on");
+        }
+        assert!((200.0..=208.0).contains(&silent), "{silent} ms");
     }
 
     #[test]

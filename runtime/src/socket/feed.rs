@@ -205,6 +205,10 @@ impl Feed {
         }
         if self.frame.len() > HEAD && !self.push() {
             self.wishes.lost.fetch_add(1, Ordering::Relaxed);
+            // A value that never changes would not come again.
+            self.wishes.at_once.iter().zip(&self.wishes.watched).for_each(|(at_once, is_watched)| {
+                at_once.fetch_or(is_watched.load(Ordering::Relaxed), Ordering::Relaxed);
+            });
         }
     }
 

@@ -132,11 +132,11 @@ mod tests {
             follower.take(1000 * MS, &[value(3, tick * 4 * MS, tick as f64), value(5, 0, 1.0)]);
             follower.send(begin + Duration::from_millis(4 * tick as u64), tick * 4 * MS);
         }
-        // The last value is not lost when no other comes.
-        follower.send(begin + Duration::from_millis(40), 24 * MS);
         let said = |tick: i64| vec![("a.x".to_owned(), (1000 + 4 * tick) * MS, Some(vec![Some(tick as f64)]))];
         assert_eq!(numbers(&lines.try_recv().unwrap()), said(0));
         assert_eq!(numbers(&lines.try_recv().unwrap()), said(5));
+        // The last value is not lost when no other comes.
+        follower.send(begin + Duration::from_millis(40), 24 * MS);
         assert_eq!(numbers(&lines.try_recv().unwrap()), said(6));
         assert!(lines.try_recv().is_err());
     }

@@ -39,7 +39,7 @@ pub struct Params {
 
 /// Somebody behind a topic of ROS 2 who guides an arm: a joystick, a planner, MoveIt. It needs no ROS installation.
 ///
-/// The messages have velocities in m/s and rad/s. Who lets go may stop publishing, or publish zeros. Silence is no failure
+/// The messages have velocities in m/s and rad/s. Somebody who lets go may stop publishing, or publish zeros. Silence is no failure
 /// of this device: the greatest age on the wire of the velocity, and the policy of the role, decide what it means.
 ///
 /// The stamp of a message says when the velocity was wanted. It counts by the wall clock, so that one that was delayed moves
@@ -180,7 +180,7 @@ impl Hearing {
     fn warn(&mut self, why: &str) {
         if self.warned.is_none_or(|at| at.elapsed() >= WARN) {
             self.warned = Some(Instant::now());
-            tracing::warn!("nobody guides: {why}");
+            tracing::warn!("a message of a guide is refused: {why}");
         }
     }
 }

@@ -79,19 +79,29 @@ pub(super) fn run(args: &PublishArgs, shell: &Shell) -> Result<u8, u8> {
     let refuse = |message: String| shell.refuse(message);
     let naming = Naming { prefix: args.prefix.clone(), frames: args.frame.clone(), has_transforms: !args.no_tf };
     naming.check().map_err(refuse)?;
-    let mut found = find(args, shell, None).map_err(refuse)?;
     let board = Board::join(args.domain.map(usize::from), args.network).map_err(refuse)?;
+    let mut said = String::new();
     loop {
-        let code = show(args, (&board, &naming), found, shell)?;
-        if !args.wait {
-            return Ok(code);
+        let found = find(args, shell, &board).map_err(refuse)?;
+        match show(args, (&board, &naming), found, shell) {
+            Ok(code) if !args.wait => return Ok(code),
+            Ok(_) => said.clear(),
+            Err(why) if !args.wait => return Err(shell.refuse(why)),
+            Err(why) => {
+                // Perhaps the run ends, and the next one fits.
+                if why != said {
+                    shell.warning(&why);
+                    said = why;
+                }
+                board.diagnose(&[of_nothing()]);
+                sleep(REPEAT);
+            }
         }
-        found = find(args, shell, Some(&board)).map_err(refuse)?;
     }
 }
 
 /// Finds the run, or waits for it. While it waits, `board` says that nothing runs.
-fn find(args: &PublishArgs, shell: &Shell, board: Option<&Board>) -> Result<FoundRun, String> {
+fn find(args: &PublishArgs, shell: &Shell, board: &Board) -> Result<FoundRun, String> {
     let mut said: Option<Instant> = None;
     loop {
         match args.run.find() {
@@ -104,19 +114,25 @@ fn find(args: &PublishArgs, shell: &Shell, board: Option<&Board>) -> Result<Foun
         }
         if said.is_none_or(|said| said.elapsed() >= REPEAT) {
             said = Some(Instant::now());
-            if let Some(board) = board {
-                board.diagnose(&[of_nothing()]);
-            }
+            board.diagnose(&[of_nothing()]);
         }
         sleep(LOOK);
     }
 }
 
 /// Publishes a run until it has ended. Returns the exit code.
-fn show(args: &PublishArgs, (board, naming): (&Board, &Naming), mut run: FoundRun, shell: &Shell) -> Result<u8, u8> {
-    let about = run.about().map_err(|why| shell.refuse(why))?;
-    let following = run.follow(args.ports.clone(), 1e3 / args.rate).map_err(|why| shell.refuse(why))?;
-    let topics = board.topics(following.ports(), naming).map_err(|why| shell.refuse(why))?;
+///
+/// # Errors
+/// Why it cannot be published.
+fn show(
+    args: &PublishArgs,
+    (board, naming): (&Board, &Naming),
+    mut run: FoundRun,
+    shell: &Shell,
+) -> Result<u8, String> {
+    let about = run.about()?;
+    let following = run.follow(args.ports.clone(), 1e3 / args.rate)?;
+    let topics = board.topics(following.ports(), naming)?;
     let rows = topics.rows();
     shell.say_beside(&format!("{} (process {}) is published on /diagnostics{}", about.graph, about.pid, and(&rows)));
     let lost = Arc::new(AtomicU64::new(0));
@@ -127,7 +143,7 @@ fn show(args: &PublishArgs, (board, naming): (&Board, &Naming), mut run: FoundRu
     if lost > 0 {
         shell.warning(format_args!("{lost} messages were not sent, because a subscriber did not answer"));
     }
-    let end = end.map_err(|why| shell.refuse(why))?;
+    let end = end?;
     board.diagnose(&[of_end(&about.graph, end.as_ref())]);
     board.settle();
     Ok(match end {

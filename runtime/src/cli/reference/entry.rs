@@ -227,8 +227,9 @@ impl Entry {
 fn roles_of(device: &dyn DeviceType) -> Vec<String> {
     let example: toml::Table = device.example().parse().unwrap_or_default();
     let roles = example.get("roles").and_then(toml::Value::as_table);
-    let kinds = roles.into_iter().flatten().filter_map(|(_, kind)| kind.as_str());
-    kinds.map(str::to_owned).collect()
+    let kind =
+        |(_, role): (&String, &toml::Value)| Some(role.as_str().or_else(|| role.get("type")?.as_str())?.to_owned());
+    roles.into_iter().flatten().filter_map(kind).collect()
 }
 
 /// Returns the block of a node or a device as written, or `None` without an example.

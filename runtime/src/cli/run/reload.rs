@@ -25,6 +25,8 @@ const PAUSE: f64 = 0.1;
 pub(super) struct Reload {
     /// Whether it must be quiet before: it moves an arm in real time.
     needs_quiet: bool,
+    /// Whether it began halted.
+    begins_halted: bool,
     /// Ends the run.
     pub(super) end: Arc<AtomicBool>,
     /// Whether a graph waits that was saved and has no mistake.
@@ -70,6 +72,8 @@ impl Drop for OverAtDrop<'_> {
 /// The side of the ticks: ends the run once it is quiet.
 pub(super) struct Exchange<'r> {
     reload: &'r Reload,
+    /// Whether the operator knows that it began halted.
+    has_announced: bool,
     /// The reason against it that was printed last.
     said: Option<Unquiet>,
     /// When to look again [s].
@@ -78,11 +82,15 @@ pub(super) struct Exchange<'r> {
 
 impl<'r> Exchange<'r> {
     pub(super) const fn new(reload: &'r Reload) -> Self {
-        Self { reload, said: None, next: f64::NEG_INFINITY }
+        Self { reload, has_announced: false, said: None, next: f64::NEG_INFINITY }
     }
 
     /// Called after each tick.
     pub(super) fn after(&mut self, engine: &Engine, shell: &Shell) {
+        // Not before the first tick: what is typed from now on counts.
+        if !std::mem::replace(&mut self.has_announced, true) && self.reload.begins_halted {
+            shell.say_beside("the graph begins as after `stop`: nothing moves before `resume` is typed");
+        }
         if !self.reload.is_waiting.load(Ordering::Relaxed) {
             self.said = None;
             return;
@@ -106,10 +114,10 @@ impl<'r> Exchange<'r> {
 }
 
 impl JobOptions {
-    /// Returns the options of the n-th run in real time: a graph that moves begins halted, and its files do not replace
-    /// those of the runs before it.
-    fn of_run_number(&self, n: usize, moves: bool) -> Self {
-        let numbered = |path: &PathBuf| super::target::numbered(path, n);
+    /// Returns the options of a run after a graph was saved, in real time: a graph that moves begins halted, and its files
+    /// replace none.
+    fn after_saving(&self, moves: bool) -> Self {
+        let numbered = |path: &PathBuf| super::target::numbered(path);
         let mut points = self.points.clone();
         points.iter_mut().for_each(|points| points.path = numbered(&points.path));
         Self {
@@ -133,17 +141,16 @@ impl Job {
             Ok(interrupt) => interrupt,
             Err(error) => return shell.refuse(format_args!("cannot run: {error}")),
         };
-        let (mut saved, mut n) = (SavedFiles::new(&self.request.graph), 0);
+        let (mut saved, mut is_first) = (SavedFiles::new(&self.request.graph), true);
         loop {
             saved.begin();
             let (code, next) = match slow::compile(&self.request, shell, &mut |sources| saved.follow(sources)) {
-                Ok((plan, request)) => {
-                    n += 1;
-                    match self.run_watched(plan, &request, n, &mut saved, shell) {
-                        Ok(end) => end,
-                        Err(message) => return shell.refuse(message),
-                    }
-                }
+                Ok((plan, request)) => match self.run_watched(plan, &request, is_first, &mut saved, shell) {
+                    Ok(end) => end,
+                    Err(message) if is_first => return shell.refuse(message),
+                    // Another save can mend it.
+                    Err(message) => (shell.refuse(message), None),
+                },
                 Err(code) => (code, None),
             };
             if !interrupt.is_requested() && next.is_none() {
@@ -152,15 +159,17 @@ impl Job {
             let next = next.filter(|_| !interrupt.is_requested());
             let Some(path) = next.or_else(|| saved.wait(&interrupt)) else { return code };
             shell.say_beside(&format!("`{}` was saved", path.display()));
+            is_first = false;
         }
     }
 
-    /// Runs a plan as the n-th run. Returns the exit code, and the file for which another run begins, if one was saved.
+    /// Runs a plan, either the first one or that of a graph that was saved. Returns the exit code, and the file for which
+    /// another run begins, if one was saved.
     fn run_watched(
         &self,
         plan: Compiled,
         request: &Request,
-        n: usize,
+        is_first: bool,
         saved: &mut SavedFiles,
         shell: &Shell,
     ) -> Result<(u8, Option<PathBuf>), String> {
@@ -175,18 +184,16 @@ impl Job {
             options: self.options.clone(),
             print: self.print,
         };
-        if n > 1 && is_real {
-            job.options = self.options.of_run_number(n, moves);
-            if moves {
-                shell.say_beside("the graph begins as after `stop`: nothing moves before `resume` is typed");
-            }
+        if !is_first && is_real {
+            job.options = self.options.after_saving(moves);
         }
         let checks = |saved: &mut SavedFiles| {
             let compiled = graph::compile(shell.catalogue(), request);
             saved.follow(compiled.as_ref().map_or_else(|report| &report.sources, |plan| &plan.sources));
             compiled.inspect_err(|report| shell.show(report)).is_ok()
         };
-        let reload = Reload { needs_quiet: is_real && moves, ..Reload::default() };
+        let needs_quiet = is_real && moves;
+        let reload = Reload { needs_quiet, begins_halted: needs_quiet && !is_first, ..Reload::default() };
         scope(|scope| {
             let look = || reload.look(saved, checks, is_real);
             let thread = Builder::new().name("saved files".into()).spawn_scoped(scope, look);

@@ -18,16 +18,20 @@ pub(crate) fn is_special(path: &Path) -> bool {
     is_stdout(path) || fs::metadata(path).is_ok_and(|file| !file.is_file() && !file.is_dir())
 }
 
-/// Returns the path of a file of the n-th run: `run-2.csv` for `run.csv`. A pipe or a device is the same for all runs.
-pub(crate) fn numbered(path: &Path, n: usize) -> PathBuf {
+/// Returns the path of a file of a further run: `run-2.csv` beside `run.csv`, or the next number of which there is none. A
+/// pipe or a device is the same for all runs.
+pub(crate) fn numbered(path: &Path) -> PathBuf {
     let (Some(stem), false) = (path.file_stem(), is_special(path)) else { return path.to_owned() };
-    let mut name = stem.to_owned();
-    name.push(format!("-{n}"));
-    if let Some(extension) = path.extension() {
-        name.push(".");
-        name.push(extension);
-    }
-    path.with_file_name(name)
+    let named = |n: usize| {
+        let mut name = stem.to_owned();
+        name.push(format!("-{n}"));
+        if let Some(extension) = path.extension() {
+            name.push(".");
+            name.push(extension);
+        }
+        path.with_file_name(name)
+    };
+    (2..).map(named).find(|path| !path.exists()).expect("there are fewer files than numbers")
 }
 
 /// Opens a file without removing its content, and waits for the reader of a pipe. An existing file is accepted only if
