@@ -412,28 +412,20 @@ fn agreed(experiment: &Experiment<'_>, shell: &Shell) -> Result<Result<Vec<Line>
             Ok(Line::mean(&runs[..=i]))
         }
         Some(_) => Err("friction holds the contact back: only the largest test signal moves it".into()),
-        None => {
-            Err(stopped.unwrap_or_else(|| match runs.windows(2).any(|pair| common(&pair[0], &pair[1]) >= ENOUGH) {
-                true => "no two test signals gave the same response".into(),
-                false => format!("fewer than {ENOUGH} frequencies stand out of the noise with two test signals"),
-            }))
-        }
+        None => Err(stopped.unwrap_or_else(|| {
+            format!("no two test signals gave the same response at {ENOUGH} frequencies that stand out of the noise")
+        })),
     })
 }
 
 /// Returns the median difference of two responses, over the frequencies where the second motion was larger: 0 if none was,
 /// because the speed bounds both. Two responses that share too few frequencies are no evidence, and differ.
 fn difference(one: &[Line], other: &[Line]) -> f64 {
-    if common(one, other) < ENOUGH {
+    if one.iter().zip(other).filter(|(a, b)| a.counts() && b.counts()).count() < ENOUGH {
         return f64::INFINITY;
     }
     let far = |a: &Line, b: &Line| (a.open - b.open).norm() / a.open.norm().max(b.open.norm());
     further(one, other, far).unwrap_or(0.0)
-}
-
-/// Returns the number of frequencies that count in both responses.
-fn common(one: &[Line], other: &[Line]) -> usize {
-    one.iter().zip(other).filter(|(a, b)| a.counts() && b.counts()).count()
 }
 
 /// Returns the second response as a multiple of the first one, over the same frequencies.
