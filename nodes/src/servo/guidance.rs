@@ -194,20 +194,6 @@ mod tests {
     }
 
     #[test]
-    fn an_old_velocity_moves_nothing() {
-        let mut rig = rig(&[]);
-        set(&mut rig, &[0.01, 0.0, 0.0, 0.0, 0.0, 0.0].map(Some));
-        rig.step();
-        let mut silent = 0.0;
-        while rig.get::<Twist>("twist").is_some() {
-            rig.step_ms(4.0);
-            silent += 4.0;
-            assert!(silent < 300.0, "the guide is silent, and the sensor moves on");
-        }
-        assert!((200.0..=208.0).contains(&silent), "{silent} ms");
-    }
-
-    #[test]
     fn other_features_are_no_velocity() {
         let other: Shape = FeaturesShape::new([("x", Unit::METRE)]).into();
         let made = NodeRig::new::<Guidance>(SPEEDS, &[("velocity", other)]);
