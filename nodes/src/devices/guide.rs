@@ -3,8 +3,7 @@
 use tactflow_runtime::device::{Description, Output, Samples};
 use tactflow_runtime::signal::{Features, FeaturesShape, Unit};
 
-/// The components of a velocity, in their order.
-pub(crate) const NAMES: [&str; 6] = ["vx", "vy", "vz", "wx", "wy", "wz"];
+use crate::motion::COMPONENTS;
 
 /// The port of the role `motion_guide`.
 #[derive(Debug, Clone, Copy)]
@@ -14,7 +13,7 @@ impl GuidePort {
     /// Adds the role `motion_guide` to a description.
     pub(crate) fn fill(description: &mut Description) -> Self {
         let [v, w] = [Unit::METRE.per_second(), Unit::RADIAN.per_second()];
-        let features = NAMES.into_iter().zip([v, v, v, w, w, w]);
+        let features = COMPONENTS.into_iter().zip([v, v, v, w, w, w]);
         Self(description.fills("motion_guide").output("velocity", FeaturesShape::new(features)))
     }
 

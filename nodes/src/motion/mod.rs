@@ -12,3 +12,6 @@ pub mod normal;
 pub mod pose;
 pub mod travel;
 pub mod weight;
+
+/// The components of a twist, in their order.
+pub const COMPONENTS: [&str; 6] = ["vx", "vy", "vz", "wx", "wy", "wz"];

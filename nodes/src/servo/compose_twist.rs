@@ -91,8 +91,7 @@ mod tests {
     use tactflow_runtime::signal::{Freshness, ScalarShape, Shape, Stamp, Unit};
 
     use super::*;
-
-    const NAMES: [&str; 6] = ["vx", "vy", "vz", "wx", "wy", "wz"];
+    use crate::motion::COMPONENTS;
 
     fn rig(names: &[&str]) -> Result<NodeRig, Mistakes> {
         let shape = || Shape::from(ScalarShape::of(Unit::METRE.per_second()));
@@ -102,8 +101,8 @@ mod tests {
 
     #[test]
     fn each_input_is_one_component_and_an_absent_one_is_zero() {
-        let mut rig = rig(&NAMES).unwrap();
-        for (i, name) in NAMES.iter().enumerate() {
+        let mut rig = rig(&COMPONENTS).unwrap();
+        for (i, name) in COMPONENTS.iter().enumerate() {
             rig.set(name, 1.0);
             rig.step();
             let mut expected = Twist::default();
@@ -113,7 +112,7 @@ mod tests {
             rig.step();
             assert_eq!((rig.get::<Twist>("twist"), rig.freshness("twist")), (None, Freshness::Lost), "{name}");
         }
-        for (i, name) in NAMES.iter().enumerate() {
+        for (i, name) in COMPONENTS.iter().enumerate() {
             rig.set(name, i as f64);
         }
         rig.step();

@@ -4,11 +4,9 @@
 use tactflow_runtime::node::{Describe, In, Inputs, Mistake, Mistakes, Node, Out, Outputs, Param, Setup, Tick};
 use tactflow_runtime::signal::{Features, Flag, Scalar, ScalarShape, Twist, Unit};
 
+use crate::motion::COMPONENTS;
 use crate::motion::bounds::{countable, scale_twist};
 use crate::usual::{USUAL_M_PER_S, USUAL_RAD_PER_S};
-
-/// The components of a velocity, in their order.
-const NAMES: [&str; 6] = ["vx", "vy", "vz", "wx", "wy", "wz"];
 
 /// Lets a person or a planner guide the sensor, within a speed.
 ///
@@ -86,8 +84,8 @@ impl Node for Guidance {
     type State = ();
 
     fn new(params: Params, setup: &mut Setup<Self>) -> Result<Self, Mistakes> {
-        if !setup.inputs.velocity.names().eq(NAMES) {
-            let message = format!("a velocity has the features `{}`", NAMES.join("`, `"));
+        if !setup.inputs.velocity.names().eq(COMPONENTS) {
+            let message = format!("a velocity has the features `{}`", COMPONENTS.join("`, `"));
             return Err(Mistake::input("velocity", message)
                 .help("wire the port `velocity` of a `motion_guide`")
                 .into());
@@ -130,7 +128,7 @@ mod tests {
 
     fn velocity() -> Shape {
         let [v, w] = [Unit::METRE.per_second(), Unit::RADIAN.per_second()];
-        FeaturesShape::new(NAMES.into_iter().zip([v, v, v, w, w, w])).into()
+        FeaturesShape::new(COMPONENTS.into_iter().zip([v, v, v, w, w, w])).into()
     }
 
     fn rig(gate: &[(&str, Shape)]) -> NodeRig {

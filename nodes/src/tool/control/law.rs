@@ -6,9 +6,6 @@ use tactflow_runtime::graph::OutlinedBlock;
 use super::settings::{Nodes, source};
 use super::shape::Shape;
 
-/// The components of a twist.
-pub(crate) const COMPONENTS: [&str; 6] = ["vx", "vy", "vz", "wx", "wy", "wz"];
-
 /// What a twist is made of.
 #[derive(Debug, Default, Serialize)]
 pub(crate) struct Law {

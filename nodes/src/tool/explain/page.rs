@@ -8,7 +8,8 @@ use tactflow_runtime::cli::table;
 use super::stability::Stability;
 use super::touch::Approach;
 use super::{Explained, ModeLaw, Motion};
-use crate::tool::control::law::{COMPONENTS, Feature};
+use crate::motion::COMPONENTS;
+use crate::tool::control::law::Feature;
 
 /// Columns of the table of features.
 const HEAD: [&str; 11] = ["feature", "setpoint", "vx", "vy", "vz", "wx", "wy", "wz", "kp, ki, kd", "delay", "measured"];

@@ -7,7 +7,8 @@ use tactflow_runtime::source::{Code, Diagnostic, Diagnostics, Edit, Item};
 
 use super::rows::{Answer, Row};
 use super::{Controlled, ModeLaw};
-use crate::tool::control::law::{COMPONENTS, Feature};
+use crate::motion::COMPONENTS;
+use crate::tool::control::law::Feature;
 use crate::tool::control::settings::{Nodes, source};
 
 /// Largest angle between a line and an axis of the sensor along which the line lies [rad].

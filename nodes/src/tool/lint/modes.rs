@@ -5,7 +5,8 @@ use tactflow_runtime::source::{Code, Diagnostic, Diagnostics, Value};
 
 use super::columns::line_axis;
 use super::{Controlled, ModeLaw};
-use crate::tool::control::law::{COMPONENTS, Feature};
+use crate::motion::COMPONENTS;
+use crate::tool::control::law::Feature;
 use crate::tool::control::settings::source;
 
 /// Nodes that guide the sensor along the object, and do not press.

@@ -63,7 +63,7 @@ mod tests {
     use nalgebra::{Rotation3, Vector3};
 
     use super::*;
-    use crate::tool::control::law::COMPONENTS;
+    use crate::motion::COMPONENTS;
 
     /// Where a pad with a pose touches a ball: the point of the pad's plane that is nearest to the centre, in its frame.
     fn touched(turn: Vector3<f64>, at: Vector3<f64>, centre: Vector3<f64>) -> Vector3<f64> {

@@ -9,7 +9,8 @@ use tactflow_runtime::graph::{Outline, OutlinedMode, Request, compile};
 use tactflow_runtime::record::PortColumns;
 
 use super::lift;
-use crate::tool::control::law::{COMPONENTS, Feature};
+use crate::motion::COMPONENTS;
+use crate::tool::control::law::Feature;
 use crate::tool::control::shape::turn;
 
 /// Frequencies of the test signal [Hz].
