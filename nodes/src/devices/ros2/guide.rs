@@ -18,6 +18,8 @@ use crate::devices::guide::GuidePort;
 const WARN: Duration = Duration::from_secs(5);
 /// How long somebody who guides keeps others from it.
 const HOLD: Duration = Duration::from_secs(1);
+/// The number of publishers whose clocks are remembered.
+const CLOCKS: usize = 16;
 
 /// Parameters of `ros2_guide`.
 #[derive(Debug, Clone, Param)]
@@ -132,7 +134,10 @@ impl Live for GuideDriver {
 struct Hearing {
     topic: String,
     frame: String,
-    agreement: Agreement,
+    /// Largest difference of two clocks that agree [ns].
+    bound: i64,
+    /// The clocks of the publishers, the newest publisher last.
+    clocks: Vec<(GUID, Agreement)>,
     /// Who guides, and since when nothing came from there.
     guide: Option<(GUID, Instant)>,
     warned: Option<Instant>,
@@ -140,7 +145,7 @@ struct Hearing {
 
 impl Hearing {
     fn new(topic: String, frame: String, bound: i64) -> Self {
-        Self { topic, frame, agreement: Agreement::new(bound, Instant::now()), guide: None, warned: None }
+        Self { topic, frame, bound, clocks: Vec::new(), guide: None, warned: None }
     }
 
     /// Takes a message that has arrived, also by the wall clock [ns]. Returns its age [ns] and its velocity.
@@ -167,8 +172,17 @@ impl Hearing {
         if stamp == 0 {
             return Err(format!("the messages of `{topic}` have no stamp, so that an old one could not be recognized"));
         }
-        self.agreement.hear(now, arrived, stamp);
-        if let Some(why) = self.agreement.why_not(topic) {
+        let place = self.clocks.iter().position(|(known, _)| *known == writer).unwrap_or(self.clocks.len());
+        if place == self.clocks.len() {
+            self.clocks.push((writer, Agreement::new(self.bound, now)));
+        }
+        let clock = &mut self.clocks[place].1;
+        clock.hear(now, arrived, stamp);
+        let why_not = clock.why_not(topic);
+        if self.clocks.len() > CLOCKS {
+            self.clocks.remove(0);
+        }
+        if let Some(why) = why_not {
             return Err(why);
         }
         self.guide = Some((writer, now));
@@ -233,5 +247,20 @@ mod tests {
         assert!(at(900, GUID::GUID_UNKNOWN).is_ok());
         assert!(at(1500, other).is_err());
         assert!(at(2000, other).is_ok());
+    }
+
+    #[test]
+    fn a_publisher_with_another_clock_keeps_nobody_from_guiding() {
+        let mut hearing = Hearing::new("/guide".into(), "pad".into(), 50 * MS);
+        let (begin, arrived) = (Instant::now(), 1_700_000_000_000 * MS);
+        for i in 1..200_u8 {
+            let (now, arrived) = (begin + 10 * Duration::from_millis(i.into()), arrived + 10 * i64::from(i) * MS);
+            // Each of them is another one, and in the end there are many.
+            let wrong = hearing.take(&message("pad", arrived + 9000 * MS), GUID::from_bytes([i; 16]), now, arrived);
+            assert!(wrong.as_ref().is_err_and(|why| why.contains("ahead of the clock")), "{wrong:?}");
+            let right = hearing.take(&message("pad", arrived - MS), GUID::GUID_UNKNOWN, now, arrived);
+            assert!(right.is_ok(), "{right:?}");
+            assert!(hearing.clocks.len() <= CLOCKS);
+        }
     }
 }

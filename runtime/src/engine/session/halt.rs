@@ -77,10 +77,13 @@ impl HaltMachine {
         self.state == HaltState::Running || self.state == HaltState::Held && policy == Policy::Stop
     }
 
-    /// Starts a halt of a task, whose name is empty for the graph itself. Call it only if the policy [escalates](Self::is_escalated_by) the state.
+    /// Starts a halt of a task, whose name is empty for the graph itself. A hold that gets another reason goes on: it lasts
+    /// as long as the commands have rested.
     pub(crate) fn halt(&mut self, task: &str, policy: Policy, fault: Fault) {
         self.end(fault.time);
-        self.since = fault.time;
+        if !self.is_halted() {
+            self.since = fault.time;
+        }
         match task {
             "" => tracing::warn!("{fault}: every command ramps to zero"),
             task => tracing::warn!("{fault}: the commands of `{task}` ramp to zero"),
@@ -171,6 +174,22 @@ mod tests {
             }
             assert!(halts.list.iter().all(|halt| halt.until.is_some()));
         }
+    }
+
+    #[test]
+    fn a_hold_lasts_from_its_first_reason_on() {
+        let mut halts = HaltMachine::new();
+        halts.halt("", Policy::Hold, fault());
+        halts.update("", true, 980_000_000);
+        halts.halt("", Policy::Hold, Fault { time: 990_000_000, ..fault() });
+        halts.update("", true, 1_010_000_000);
+        assert!(halts.is_stopped());
+        assert_eq!(halts.list.iter().map(|halt| halt.policy).collect::<Vec<_>>(), [Policy::Hold, Policy::Stop]);
+        halts.resumes = true;
+        halts.update("", false, 1_020_000_000);
+        halts.halt("", Policy::Hold, Fault { time: 1_500_000_000, ..fault() });
+        halts.update("", true, 2_030_000_000);
+        assert!(!halts.is_stopped(), "another hold counts by itself");
     }
 
     #[test]

@@ -74,9 +74,9 @@ impl TickSchedule {
 
     /// Records a tick at `now` [ns]. `has_sampled`: whether the clock device has sampled since the last tick.
     pub(crate) fn ticked(&mut self, now: i64, has_sampled: bool) {
-        // After a tick that began late, the device has its time again.
+        // After a tick that began late, the device has its time again, unless it was silent before.
         let was_late = self.last.is_some() && now > self.deadline() + self.period;
-        self.is_on_timer = self.clock != Clock::Rate && !has_sampled && !was_late;
+        self.is_on_timer = self.clock != Clock::Rate && !has_sampled && (self.is_on_timer || !was_late);
         self.has_started |= has_sampled;
         self.last = Some(now);
     }
@@ -98,6 +98,22 @@ mod tests {
             samples.next_if(|sample| *sample <= now);
         }
         assert_eq!(ticks, [0, 10, 20, 50, 60, 70, 80, 90, 100, 110]);
+    }
+
+    #[test]
+    fn a_late_tick_gives_the_clock_device_time_but_does_not_break_its_silence() {
+        let mut schedule = TickSchedule::new(Clock::Device(0), 10);
+        for (now, has_sampled, is_silent, what) in [
+            (0, true, false, "it samples"),
+            (60, false, false, "a late tick: the device may have been held up as well"),
+            (90, false, true, "three periods after it"),
+            (150, false, true, "another late tick: it has still not sampled"),
+            (160, false, true, "so the timer goes on"),
+            (165, true, false, "it is back"),
+        ] {
+            schedule.ticked(now, has_sampled);
+            assert_eq!(schedule.is_silent(), is_silent, "{what}");
+        }
     }
 
     #[test]

@@ -31,8 +31,9 @@ pub(crate) fn check(net: &Net<'_>, diagnostics: &mut Diagnostics) {
                 diagnostics.push(match net.find_candidate(0, usize::MAX, command).filter(|_| is_only) {
                     Some(port) => {
                         let line = format!("{}.{} = \"{port}\"", key.name, command.name);
-                        let edit = match net.flat.commands.last() {
-                            Some(entry) => Edit::Below(entry.wire.key.span.clone(), line.clone()),
+                        let last = net.flat.commands.last().map(|entry| &entry.wire.key.span);
+                        let edit = match last.or(net.flat.empty_commands.as_ref()) {
+                            Some(span) => Edit::Below(span.clone(), line.clone()),
                             None => Edit::Append(key.span.clone(), format!("\n[commands]\n{line}")),
                         };
                         diagnostic.help(format!("add `{line}` under [commands]")).edit(edit)

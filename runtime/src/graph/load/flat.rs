@@ -61,6 +61,8 @@ pub(crate) struct FlatGraph {
     pub(crate) nodes: Vec<FlatNode>,
     pub(crate) scopes: Vec<Scope>,
     pub(crate) commands: Vec<CommandEntry>,
+    /// The span of the section [commands] of the graph itself if it is empty.
+    pub(crate) empty_commands: Option<Range<usize>>,
     /// The limits of the task, the bench, the robots and the command line.
     pub(crate) limits: Vec<LimitSection>,
     /// The modes of all tasks.

@@ -23,6 +23,9 @@ impl Loader {
         let command =
             |(role, wire): &(Key, WireEntry)| CommandEntry { task: number, role: named(role), wire: wire.clone() };
         flat.commands.extend(document.commands.iter().map(command));
+        if number == 0 {
+            flat.empty_commands.clone_from(&document.empty_commands);
+        }
         flat.modes.extend(document.modes.iter().map(|mode| ModeBlock { task: number, ..mode.clone() }));
         flat.limits.extend(document.limits.iter().map(|section| LimitSection {
             task: number,

@@ -49,6 +49,10 @@ impl<'a> Candidate<'a> {
             || (self.wires().next().is_none() && self.lacks_all_params(spec));
         let meant = if unknown.is_empty() { None } else { self.only_fitting() }?;
         let named = |spec: &NodeSpec| self.wires().filter(|name| has_input(spec, name)).count();
+        // A type that takes inputs of any name has all keys of every block.
+        if takes_any(meant) && named(spec) > 0 {
+            return None;
+        }
         if !is_clear && named(meant) <= named(spec) {
             return None;
         }
@@ -79,8 +83,7 @@ impl<'a> Candidate<'a> {
         let wires: BTreeSet<&str> = self.wires().collect();
         let entries = self.block.params.as_table().into_iter().flat_map(|table| &table.entries);
         let params: BTreeSet<&str> = entries.map(|(key, _)| &*key.name).collect();
-        let takes_any = spec.inputs.iter().any(|input| input.need.is_many);
-        let strange_wires = wires.iter().copied().filter(|name| !takes_any && !has_input(spec, name));
+        let strange_wires = wires.iter().copied().filter(|name| !takes_any(spec) && !has_input(spec, name));
         let has_param = |name: &&str| spec.params.iter().any(|param| *param.name == **name);
         let has_output = |name: &&str| spec.outputs.iter().any(|output| output.name == **name);
         let strange_params = params.iter().copied().filter(|name| !has_param(name));
@@ -98,10 +101,14 @@ impl<'a> Candidate<'a> {
 
 /// Returns whether a type has all keys of a block.
 pub(super) fn has_keys_of(spec: &NodeSpec, block: &Block) -> bool {
-    let takes_any = spec.inputs.iter().any(|input| input.need.is_many);
     let entries = block.params.as_table().into_iter().flat_map(|table| &table.entries);
     let has_params = entries.into_iter().all(|(key, _)| spec.params.iter().any(|param| param.name == key.name));
-    has_params && (takes_any || block.wires.valid.iter().all(|wire| has_input(spec, &wire.key.name)))
+    has_params && (takes_any(spec) || block.wires.valid.iter().all(|wire| has_input(spec, &wire.key.name)))
+}
+
+/// Returns whether a type has inputs of any name.
+fn takes_any(spec: &NodeSpec) -> bool {
+    spec.inputs.iter().any(|input| input.need.is_many)
 }
 
 /// Returns whether a type has an input with this fixed name.

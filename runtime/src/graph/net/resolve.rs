@@ -74,11 +74,16 @@ impl Net<'_> {
             let message = format!("there is no role, node or part `{name}`");
             let known = || names.keys().map(String::as_str).chain(parent.map(|_| INPUTS));
             // Both names of the port may be wrong, for example in capital letters.
-            let meant = suggest_name(name, known()).and_then(|best| Some((best, names.get(best)?.1)));
-            let ports = meant.map(|(_, entity)| self.ports_of(entity)).unwrap_or_default();
+            let meant = suggest_name(name, known());
+            let ports = match meant {
+                Some(INPUTS) => declared.names().collect(),
+                meant => {
+                    meant.and_then(|best| names.get(best)).map_or_else(Vec::new, |(_, entity)| self.ports_of(*entity))
+                }
+            };
             let both = suggest_name(port, ports.iter().copied()).filter(|_| !ports.contains(&port)).zip(meant);
             return match both {
-                Some((port, (best, _))) => unknown(message).instead(&word.value, &format!("{best}.{port}")),
+                Some((port, best)) => unknown(message).instead(&word.value, &format!("{best}.{port}")),
                 None if self.flat.bench.as_ref().is_some_and(|bench| bench.bind.position(name).is_some()) => {
                     unknown_name(name.len(), message)
                         .help(format!("declare `{name}` under [roles]: the bench binds it"))

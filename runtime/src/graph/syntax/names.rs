@@ -83,7 +83,12 @@ fn correct<'k>(
             let code = if is_invalid { Code::BadName } else { code };
             let diagnostic = Diagnostic::new(code, defined[i].span.clone(), message);
             let diagnostic = diagnostic.note(first.span.clone(), format!("`{wanted}` is used here"));
-            found.push(diagnostic.instead(&names[i], wanted));
+            // A number with a decimal point is a name in a name: its first part alone cannot be replaced.
+            let is_number = names[i].bytes().all(|byte| byte.is_ascii_digit());
+            found.push(match is_number {
+                true => diagnostic.help(format!("did you mean `{wanted}`?")),
+                false => diagnostic.instead(&names[i], wanted),
+            });
             defined[i].name.clone_from(wanted);
             unused.retain(|other| *other != i);
         }

@@ -148,6 +148,8 @@ pub(crate) struct GraphDocument {
     pub(crate) parts: Vec<PartBlock>,
     /// The wires to commands, each with its role.
     pub(crate) commands: Vec<(Key, WireEntry)>,
+    /// The span of the section [commands] if it is empty.
+    pub(crate) empty_commands: Option<Range<usize>>,
     pub(crate) limits: Vec<LimitSection>,
     pub(crate) modes: Vec<ModeBlock>,
     /// The section [policy] as written, and parsed if it is valid.
@@ -221,6 +223,9 @@ impl<'a> Sections<'a> {
             wires.into_iter().map(move |wire| (role.clone(), wire))
         });
         let commands = commands.collect();
+        let is_empty = |value: &Value| value.as_table().is_some_and(|table| table.entries.is_empty());
+        let empty_commands =
+            root.entry("commands").filter(|(_, value)| is_empty(value)).map(|(key, _)| key.span.clone());
         let limits = read_limits(root, &LimitOwner::Task, &mut self.reader);
         let policy = root.get("policy");
         let policy = policy.map(|value| (value.clone(), PolicyTable::read(value, &mut self.reader)));
@@ -228,7 +233,18 @@ impl<'a> Sections<'a> {
         let modes = modes.map(|(key, table)| read_mode(key, table, &mut self.reader)).collect();
         let (roles, carriers) = self.roles(root.get("roles"));
         let allow = read_allow(root.get(ALLOW), &mut self.reader);
-        GraphDocument { graph, roles, carriers, commands, limits, modes, policy, allow, ..self.body(root) }
+        GraphDocument {
+            graph,
+            roles,
+            carriers,
+            commands,
+            empty_commands,
+            limits,
+            modes,
+            policy,
+            allow,
+            ..self.body(root)
+        }
     }
 
     /// Corrects the names of the sections of a part, before the graph overrides values in them.
