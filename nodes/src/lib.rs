@@ -144,6 +144,7 @@ pub fn catalogue() -> Catalogue {
         .node::<servo::ridge_guide::RidgeGuide>()
         .node::<servo::hold_pose::HoldPose>()
         .node::<servo::follow_path::FollowPath>()
+        .node::<servo::follow_surface::FollowSurface>()
         .node::<servo::park::Park>()
         .node::<servo::pivot::Pivot>()
         .node::<servo::twist_adder::TwistAdder>()

@@ -6,6 +6,7 @@ pub mod deadband;
 pub mod edge_guard;
 pub mod feature_error;
 pub mod follow_path;
+pub mod follow_surface;
 pub mod gain_schedule;
 pub mod guidance;
 pub mod hold_pose;
