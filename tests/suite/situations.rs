@@ -242,8 +242,8 @@ fn types() -> Vec<(String, Vec<String>)> {
     types
 }
 
-/// Nodes that write no numbers cannot write a wrong one, nor can one that begins at the end of the task.
-const WITHOUT_NUMBERS: [&str; 3] = ["binarize", "label", "park"];
+/// Nodes that write no numbers cannot write a wrong one, nor can one that begins later in the task.
+const WITHOUT_NUMBERS: [&str; 4] = ["binarize", "label", "park", "follow_surface"];
 
 #[test]
 fn a_nan_at_each_node_in_turn_ends_the_run_and_names_it() {

@@ -230,9 +230,9 @@ mod tests {
             self.rig.step_ms(4.0);
             let twist = self.rig.get::<Twist>("twist")?;
             let moved = twist.linear() + twist.angular().cross(&self.at);
-            assert!(!(moved.amax() > 1e-15), "the contact rests on the pad: {moved}");
+            assert!(moved.amax() <= 1e-15 || moved.x.is_nan(), "the contact rests on the pad: {moved}");
             let rolling = turn * twist.angular();
-            assert!(!(rolling.z.abs() > 0.0));
+            assert!(rolling.z == 0.0 || rolling.z.is_nan());
             Some([-rolling.x, rolling.y])
         }
 
@@ -255,7 +255,7 @@ mod tests {
     proptest! {
         #[test]
         fn around_a_cylinder_it_rolls_with_its_speed_over_its_radius(
-            radius in 0.03..0.3_f64, angle in 0.0..6.28_f64, yaw in -3.1..3.1_f64,
+            radius in 0.03..0.3_f64, angle in -3.1..3.1_f64, yaw in -3.1..3.1_f64,
             at in prop::array::uniform2(-0.02..0.02_f64),
         ) {
             let mut cylinder = Cylinder::new("", radius);

@@ -25,10 +25,7 @@ impl Net<'_> {
 
     fn resolve_at_depth(&self, scope: usize, word: &Spanned<String>, depth: usize) -> Resolved<PortRef> {
         let diagnostic = |code: Code, message: String| Diagnostic::new(code, word.span.clone(), message);
-        let unknown = |message: String| diagnostic(Code::UnknownPort, message);
-        // The mistake is in the name before the dot, or in the port behind it.
-        let unknown_name =
-            |length: usize, message: String| Diagnostic::new(Code::UnknownPort, word.part(0..length), message);
+        // The mistake is in the port behind the dot.
         let unknown_port = |length: usize, message: String| {
             Diagnostic::new(Code::UnknownPort, word.part(word.value.len() - length..word.value.len()), message)
         };
@@ -67,30 +64,7 @@ impl Net<'_> {
             return Ok(PortRef { producer: Producer::Task(*task), port: number });
         }
         let Some((_, entity)) = names.get(name) else {
-            if self.observed.iter().any(|(key, ..)| key.name == name) {
-                let message = format!("`{}` is only for scenarios and recordings: a task cannot read it", word.value);
-                return diagnostic(Code::ObservedRole, message).help(OBSERVED_HELP).into_err();
-            }
-            let message = format!("there is no role, node or part `{name}`");
-            let known = || names.keys().map(String::as_str).chain(parent.map(|_| INPUTS));
-            // Both names of the port may be wrong, for example in capital letters.
-            let meant = suggest_name(name, known());
-            let ports = match meant {
-                Some(INPUTS) => declared.names().collect(),
-                meant => {
-                    meant.and_then(|best| names.get(best)).map_or_else(Vec::new, |(_, entity)| self.ports_of(*entity))
-                }
-            };
-            let both = suggest_name(port, ports.iter().copied()).filter(|_| !ports.contains(&port)).zip(meant);
-            return match both {
-                Some((port, best)) => unknown(message).instead(&word.value, &format!("{best}.{port}")),
-                None if self.flat.bench.as_ref().is_some_and(|bench| bench.bind.position(name).is_some()) => {
-                    unknown_name(name.len(), message)
-                        .help(format!("declare `{name}` under [roles]: the bench binds it"))
-                }
-                None => self.suggest_name_in(scope, name, unknown_name(name.len(), message)),
-            }
-            .into_err();
+            return self.unknown_name(scope, word, name, port).into_err();
         };
         self.port_of(*entity, port, depth).unwrap_or_else(|| {
             let message = format!("`{name}` has no output `{port}`");
@@ -99,6 +73,32 @@ impl Net<'_> {
             }
             unknown_port(port.len(), message).suggest(port, self.ports_of(*entity).into_iter(), "outputs").into_err()
         })
+    }
+
+    /// Reports a word `name.port` whose name is no role, node or part of a scope.
+    fn unknown_name(&self, scope: usize, word: &Spanned<String>, name: &str, port: &str) -> Diagnostic {
+        let whole = |code: Code, message: String| Diagnostic::new(code, word.span.clone(), message);
+        if self.observed.iter().any(|(key, ..)| key.name == name) {
+            let message = format!("`{}` is only for scenarios and recordings: a task cannot read it", word.value);
+            return whole(Code::ObservedRole, message).help(OBSERVED_HELP);
+        }
+        let Scope { names, declared, parent, .. } = &self.flat.scopes[scope];
+        let message = format!("there is no role, node or part `{name}`");
+        // Both names of the port may be wrong, for example in capital letters.
+        let meant = suggest_name(name, names.keys().map(String::as_str).chain(parent.map(|_| INPUTS)));
+        let ports = match meant {
+            Some(INPUTS) => declared.names().collect(),
+            meant => meant.and_then(|best| names.get(best)).map_or_else(Vec::new, |(_, entity)| self.ports_of(*entity)),
+        };
+        let both = suggest_name(port, ports.iter().copied()).filter(|_| !ports.contains(&port)).zip(meant);
+        if let Some((port, best)) = both {
+            return whole(Code::UnknownPort, message).instead(&word.value, &format!("{best}.{port}"));
+        }
+        let diagnostic = Diagnostic::new(Code::UnknownPort, word.part(0..name.len()), message);
+        if self.flat.bench.as_ref().is_some_and(|bench| bench.bind.position(name).is_some()) {
+            return diagnostic.help(format!("declare `{name}` under [roles]: the bench binds it"));
+        }
+        self.suggest_name_in(scope, name, diagnostic)
     }
 
     /// Resolves a port of a role, a node or a part, or returns `None` if it has none with that name.

@@ -14,6 +14,7 @@ mod record;
 mod reserved;
 mod roles;
 mod sections;
+mod wires;
 
 pub(crate) use allow::Allowance;
 pub(crate) use binding::Binding;
@@ -27,6 +28,5 @@ pub(crate) use record::RecordTable;
 pub(crate) use reserved::{
     ALLOW_UNCALIBRATED, INPUTS, LIMITS, LIVE, MODES, NO_ARM, ROBOT, SENSOR, TASK_SECTIONS, WORDS,
 };
-pub(crate) use sections::{
-    BenchDocument, Block, CommandEntry, GraphDocument, GraphTable, PartBlock, Sections, WireEntry, into_diagnostic,
-};
+pub(crate) use sections::{BenchDocument, Block, GraphDocument, GraphTable, PartBlock, Sections, into_diagnostic};
+pub(crate) use wires::{CommandEntry, WireEntry};

@@ -13,9 +13,10 @@ use super::correct::{
 use super::limits::{LimitOwner, LimitSection, read_limits};
 use super::model::{ModelDocument, ModelFile, read_model};
 use super::modes::{ModeBlock, read_mode};
-use super::policy::{AgeLimit, OnFail, PolicyTable, WireTable};
+use super::policy::{OnFail, PolicyTable};
 use super::read::read_table;
 use super::reserved::{ALLOW, ALLOW_UNCALIBRATED, GRAPH_SECTIONS, LIMITS, MODELS, is_name};
+use super::wires::{InputWires, WireEntry};
 use crate::node::{At, FilePath, Measured, Mistake, Param, Reader, Spanned};
 use crate::source::{Code, Diagnostic, Diagnostics, Item, Key, Named, SourceMap, Table, Value, suggest_name};
 
@@ -42,69 +43,6 @@ pub(crate) struct GraphTable {
     pub(crate) show: Option<Vec<Spanned<String>>>,
     /// Ports of the x and the y of the contact, marked in the first image that is shown.
     pub(crate) mark: Option<[Spanned<String>; 2]>,
-}
-
-/// A wire: its input or command, and the port that it reads.
-#[derive(Debug, Clone)]
-pub(crate) struct WireEntry {
-    pub(crate) key: Key,
-    pub(crate) from: Spanned<String>,
-    pub(crate) age: Option<AgeLimit>,
-}
-
-/// A wire to a command or a report of a role.
-#[derive(Debug, Clone)]
-pub(crate) struct CommandEntry {
-    /// The task whose file has the wire.
-    pub(crate) task: usize,
-    /// The role of the graph, where the file names it.
-    pub(crate) role: Key,
-    pub(crate) wire: WireEntry,
-}
-
-/// The table `in` of a block.
-#[derive(Debug, Clone, Default)]
-pub(crate) struct InputWires {
-    pub(crate) valid: Vec<WireEntry>,
-    /// Inputs whose wire is invalid and has its own diagnostic.
-    invalid: Vec<Key>,
-}
-
-impl InputWires {
-    /// Returns whether a wire is invalid and has its own diagnostic.
-    pub(crate) fn has_invalid(&self) -> bool {
-        !self.invalid.is_empty()
-    }
-
-    /// Returns the only `required` input without a wire, if one wire leads to none of the `known` inputs: it was meant.
-    pub(crate) fn only_lacks<'n>(
-        &self,
-        known: impl Iterator<Item = &'n str>,
-        required: impl Iterator<Item = &'n str>,
-    ) -> Option<&'n str> {
-        let names: BTreeSet<&str> = known.collect();
-        let keys = || self.valid.iter().map(|wire| &wire.key).chain(&self.invalid).map(|key| key.name.as_str());
-        let wired: BTreeSet<&str> = keys().collect();
-        let strange = keys().filter(|key| !names.contains(key)).count();
-        let mut open = required.filter(|name| !wired.contains(name));
-        open.next().filter(|_| strange == 1 && open.next().is_none())
-    }
-
-    /// Returns the `known` inputs that have no wire. A wire to a misspelt name counts, since it has its own diagnostic.
-    pub(crate) fn lacking<'n>(&self, known: impl Iterator<Item = &'n str> + Clone) -> BTreeSet<&'n str> {
-        let names: BTreeSet<&str> = known.clone().collect();
-        let keys = || self.valid.iter().map(|wire| &wire.key).chain(&self.invalid).map(|key| key.name.as_str());
-        let wired: BTreeSet<&str> = keys().collect();
-        let mut lacking = names.clone();
-        lacking.retain(|name| !wired.contains(name));
-        for strange in keys().filter(|key| !names.contains(key)) {
-            if lacking.is_empty() {
-                break;
-            }
-            suggest_name(strange, known.clone()).map(|meant| lacking.remove(meant));
-        }
-        lacking
-    }
 }
 
 /// The block of a node or a device: its type, its wires and its parameters.
@@ -219,7 +157,7 @@ impl<'a> Sections<'a> {
         let graph =
             root.entry("graph").map(|(key, value)| (key.span.clone(), GraphTable::read(value, &mut self.reader)));
         let commands = self.table(root.get("commands")).entries.into_iter().flat_map(|(role, value)| {
-            let wires = self.wire_entries(Some(&value)).valid;
+            let wires = InputWires::read(Some(&value), &mut self.reader).valid;
             wires.into_iter().map(move |wire| (role.clone(), wire))
         });
         let commands = commands.collect();
@@ -399,7 +337,7 @@ impl<'a> Sections<'a> {
     /// Reads the table `in` of a block.
     fn wires(&mut self, table: &mut Table) -> InputWires {
         let wires = table.remove("in").map(|(_, value)| value);
-        let mut wires = self.wire_entries(wires.as_ref());
+        let mut wires = InputWires::read(wires.as_ref(), &mut self.reader);
         let mut invalid = Vec::new();
         wires.valid.retain_mut(|WireEntry { key, .. }| {
             if key.name == "from" {
@@ -429,33 +367,6 @@ impl<'a> Sections<'a> {
     /// Reads the section [bind].
     fn bindings(&mut self, value: Option<&Value>) -> Named<Binding> {
         self.words(value).iter().map(|(key, word)| (key.clone(), Binding { word: word.clone() })).collect()
-    }
-
-    /// Reads a table whose values are wires, each a port or a table with an age limit.
-    fn wire_entries(&mut self, value: Option<&Value>) -> InputWires {
-        let mut wires = InputWires::default();
-        for (key, value) in self.table(value).entries {
-            let wire = match value.as_table() {
-                Some(table) => self.aged_wire(&value, table),
-                None => Spanned::read(&value, &mut self.reader).map(|from| (from, None)),
-            };
-            match wire {
-                Some((from, age)) => wires.valid.push(WireEntry { key, from, age }),
-                None => wires.invalid.push(key),
-            }
-        }
-        wires
-    }
-
-    /// Reads a wire with an age limit.
-    fn aged_wire(&mut self, value: &Value, table: &Table) -> Option<(Spanned<String>, Option<AgeLimit>)> {
-        if let Some(wire) = WireTable::read(value, &mut self.reader) {
-            let age = AgeLimit::of(&wire);
-            return Some((wire.from, Some(age)));
-        }
-        // The table has a diagnostic; its port is still resolved, to report a second mistake there.
-        let from = table.get("from")?;
-        Some((Spanned { value: from.as_str()?.to_owned(), span: from.span.clone() }, None))
     }
 
     /// Reads a table whose keys are names and whose values are strings.
