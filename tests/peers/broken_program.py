@@ -87,6 +87,8 @@ def main(wrong: str, after: int) -> None:
             os.kill(os.getpid(), 9)
         if wrong == "hang":
             time.sleep(600)
+        if wrong == "slow":
+            time.sleep(0.15)
         if wrong == "flood":
             say(answer(number, stamp, total) * 100)
             continue

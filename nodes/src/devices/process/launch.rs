@@ -16,6 +16,8 @@ pub(super) struct Launch {
     pub(super) signature: Signature,
     /// The values of its parameters.
     pub(super) values: BTreeMap<String, f64>,
+    /// Nominal time between two answers.
+    pub(super) period: Duration,
     /// Longest time for an answer.
     pub(super) timeout: Duration,
     /// Longest time until it has stated its signature.

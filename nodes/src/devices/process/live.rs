@@ -1,7 +1,7 @@
 //! A program in real time: it gets the newest values when it has answered, and a tick never waits for it.
 
 use std::sync::Arc;
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
 use async_trait::async_trait;
 use tactflow_runtime::device::{DeviceError, Link, Live};
@@ -10,15 +10,41 @@ use super::launch::Launch;
 use super::ports::Ports;
 use super::session::Session;
 
+/// Nominal periods after which a sample is too old, where the graph says nothing else.
+const MAX_PERIODS: u32 = 5;
+/// Shortest time between two warnings.
+const WARN: Duration = Duration::from_secs(5);
+
 /// A program beside the tick.
 pub(super) struct Beside {
     launch: Arc<Launch>,
     ports: Ports,
+    warned: Option<Instant>,
 }
 
 impl Beside {
     pub(super) fn new(launch: Arc<Launch>, ports: Ports) -> Self {
-        Self { launch, ports }
+        Self { launch, ports, warned: None }
+    }
+}
+
+impl Beside {
+    /// Counts an answer that took so long that it is too old when it comes, and says what to write instead.
+    fn judge(&mut self, took: Duration, link: &mut Link) {
+        let Launch { signature, period, .. } = &*self.launch;
+        if took <= MAX_PERIODS * *period {
+            return;
+        }
+        link.count("late answers");
+        if self.warned.is_none_or(|at| at.elapsed() >= WARN) {
+            self.warned = Some(Instant::now());
+            let [took, period] = [took, *period].map(|time| time.as_secs_f64() * 1e3);
+            tracing::warn!(
+                "an answer of `{}` took {took:.0} ms, and is too old after {MAX_PERIODS} times its `period_ms` of {period} ms, \
+                 unless the graph says otherwise: write the time that an answer takes as `period_ms`",
+                signature.name
+            );
+        }
     }
 }
 
@@ -48,11 +74,13 @@ impl Live for Beside {
             let Some(question) = self.ports.question(link.commands(), now) else { continue };
             link.count_each(&[("questions", 1), ("skipped inputs", self.ports.skipped())]);
             let (number, stamp) = (question.number, question.stamp);
+            let asked = Instant::now();
             let values = tokio::select! {
                 biased;
                 () = &mut stopped => break,
                 values = session.ask(question) => values?,
             };
+            self.judge(asked.elapsed(), &mut link);
             link.publish(|samples| self.ports.write(&values, stamp, number, samples));
         }
         session.dismiss();

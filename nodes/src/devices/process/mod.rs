@@ -230,6 +230,7 @@ fn launch(params: &Params, signature: Signature) -> Launch {
         folder: folder.map_or_else(|| PathBuf::from("."), Path::to_path_buf),
         values: values.collect(),
         signature,
+        period: Duration::from_secs_f64(params.period_ms * 1e-3),
         timeout: Duration::from_secs_f64(params.timeout_ms * 1e-3),
         start: Duration::from_secs_f64(params.start_s),
     }

@@ -116,6 +116,7 @@ pub(crate) fn ask_signature(command: &[String], folder: &Path, patience: Duratio
         folder: folder.to_path_buf(),
         signature: nothing,
         values: BTreeMap::new(),
+        period: Duration::ZERO,
         timeout: patience,
         start: patience,
     };
