@@ -2,6 +2,7 @@
 
 mod guide;
 mod shown;
+mod topics;
 
 use std::fs;
 use std::io::Write;
@@ -49,7 +50,7 @@ impl Robot {
         let (folder, path) = in_new_folder("bench.toml");
         let text = fs::read_to_string(workspace().join("tests/data/ros2_bench.toml")).unwrap();
         let text = text.replace("../../graphs", &workspace().join("graphs").display().to_string());
-        let mut text = text.replace("domain = 17", &format!("domain = {}\nconnect_s = 2.0", self.domain));
+        let mut text = text.replace("domain = 17", &format!("domain = {}", self.domain));
         for (from, to) in change {
             assert!(text.contains(from), "{from}");
             text = text.replace(from, to);

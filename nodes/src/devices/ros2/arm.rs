@@ -60,7 +60,7 @@ pub struct Params {
     joints: Option<Vec<String>>,
     #[param(flatten)]
     place: Place,
-    /// The arm's model.
+    /// The arm's model. The robot file that `robot` names has it, and `tip` and `home` too.
     urdf: FilePath,
     /// Link that carries the sensor.
     tip: String,

@@ -3,7 +3,9 @@
 //! The names are those that ROS 2 gives to its topics and types on the wire of DDS. There is no node of ROS behind them:
 //! `ros2 topic info -v` lists the endpoints, and `ros2 node list` lists nothing.
 
+use std::collections::BTreeMap;
 use std::net::IpAddr;
+use std::sync::Mutex;
 use std::time::Duration;
 
 use futures_util::StreamExt;
@@ -24,6 +26,12 @@ pub(super) const MAX_DOMAIN: usize = 101;
 #[cfg(all(feature = "cli", unix))]
 const SHOWN_DEPTH: i32 = 10;
 
+/// The participants of this process: two devices of a bench are no strangers to each other.
+static OURS: Mutex<Vec<GUID>> = Mutex::new(Vec::new());
+
+/// Number of topics that a message lists.
+const MAX_LISTED: usize = 6;
+
 /// Number of writers of a topic whose types are remembered.
 const MAX_TRUSTED: usize = 16;
 
@@ -41,6 +49,18 @@ pub(super) struct Peer {
     pub(super) guid: GUID,
     /// Name of the type, as ROS writes it.
     pub(super) kind: String,
+}
+
+/// A topic of ROS with one type, as others use it.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(crate) struct Offer {
+    /// Its name, such as `/joint_states`.
+    pub(crate) topic: String,
+    /// The type of its messages, as ROS writes it.
+    pub(crate) kind: String,
+    /// Number of those who write it, and who read it.
+    pub(crate) writers: usize,
+    pub(crate) readers: usize,
 }
 
 /// The messages of a topic.
@@ -91,6 +111,7 @@ impl Domain {
         let qos = QosPolicyBuilder::new().build();
         let publisher = participant.create_publisher(&qos).map_err(|error| failed(&error))?;
         let subscriber = participant.create_subscriber(&qos).map_err(|error| failed(&error))?;
+        ours().push(participant.guid());
         Ok(Self { id, participant, publisher, subscriber })
     }
 
@@ -134,25 +155,43 @@ impl Domain {
     /// Returns who else writes a topic.
     pub(super) fn writers(&self, name: &str) -> Vec<Peer> {
         let topic = dds_name(name);
-        let found = self.participant.discovered_writers().into_iter().map(|writer| writer.publication_topic_data);
-        let found = found.filter(|data| data.topic_name == topic && self.is_foreign(data.key));
-        found.map(|data| Peer { guid: data.key, kind: ros_type(&data.type_name) }).collect()
+        self.all_writers().filter(|(of, _)| *of == topic).map(|(_, peer)| peer).collect()
     }
 
     /// Returns who else reads a topic.
     pub(super) fn readers(&self, name: &str) -> Vec<Peer> {
         let topic = dds_name(name);
-        let found = self.participant.discovered_readers().into_iter();
-        let found = found.filter(|reader| *reader.subscription_topic_data.topic_name() == topic);
-        let found = found.map(|reader| Peer {
-            guid: reader.reader_proxy.remote_reader_guid,
-            kind: ros_type(reader.subscription_topic_data.type_name()),
-        });
-        found.filter(|peer| self.is_foreign(peer.guid)).collect()
+        self.all_readers().filter(|(of, _)| *of == topic).map(|(_, peer)| peer).collect()
     }
 
-    fn is_foreign(&self, guid: GUID) -> bool {
-        guid.prefix != self.participant.guid().prefix
+    /// Returns who else writes, each with the topic on the wire.
+    fn all_writers(&self) -> impl Iterator<Item = (String, Peer)> {
+        let found = self.participant.discovered_writers().into_iter().map(|writer| writer.publication_topic_data);
+        let found = found.filter(|data| is_foreign(data.key));
+        found.map(|data| (data.topic_name, Peer { guid: data.key, kind: ros_type(&data.type_name) }))
+    }
+
+    /// Returns who else reads, each with the topic on the wire.
+    fn all_readers(&self) -> impl Iterator<Item = (String, Peer)> {
+        let found = self.participant.discovered_readers().into_iter();
+        let found = found.filter(|reader| is_foreign(reader.reader_proxy.remote_reader_guid));
+        found.map(|reader| {
+            let data = reader.subscription_topic_data;
+            let kind = ros_type(data.type_name());
+            (data.topic_name().clone(), Peer { guid: reader.reader_proxy.remote_reader_guid, kind })
+        })
+    }
+
+    /// Returns the topics of ROS that others use, by name.
+    pub(crate) fn offers(&self) -> Vec<Offer> {
+        let mut counts: BTreeMap<(String, String), [usize; 2]> = BTreeMap::new();
+        let writers = self.all_writers().map(|found| (found, 0));
+        for ((topic, peer), side) in writers.chain(self.all_readers().map(|found| (found, 1))) {
+            if let Some(name) = topic.strip_prefix("rt/") {
+                counts.entry((format!("/{name}"), peer.kind)).or_default()[side] += 1;
+            }
+        }
+        counts.into_iter().map(|((topic, kind), [writers, readers])| Offer { topic, kind, writers, readers }).collect()
     }
 
     /// Says why no message of a topic has come.
@@ -174,21 +213,56 @@ impl Domain {
 
     /// Says what is heard in the domain.
     fn neighbours(&self) -> String {
-        let of_ros = |topic: &str| topic.strip_prefix("rt/").map(|name| format!("`/{name}`"));
-        let writers = self.participant.discovered_writers().into_iter().map(|writer| writer.publication_topic_data);
-        let writers = writers.filter(|data| self.is_foreign(data.key));
-        let mut topics: Vec<String> = writers.filter_map(|data| of_ros(&data.topic_name)).collect();
-        topics.sort();
-        topics.dedup();
+        let written = self.offers().into_iter().filter(|offer| offer.writers > 0);
+        let topics: Vec<String> = written.map(|offer| format!("`{}` ({})", offer.topic, offer.kind)).collect();
         let id = self.id;
         match topics.as_slice() {
             [] => format!("in the domain {id}, where no topic of ROS is published: check `domain` and `network`"),
-            few if few.len() <= 6 => format!("in the domain {id}; published there: {}", few.join(", ")),
+            few if few.len() <= MAX_LISTED => format!("in the domain {id}; published there: {}", few.join(", ")),
             many => {
-                format!("in the domain {id}; published there: {} and {} more", many[..6].join(", "), many.len() - 6)
+                let (few, more) = (many[..MAX_LISTED].join(", "), many.len() - MAX_LISTED);
+                format!(
+                    "in the domain {id}; published there: {few} and {more} more, which `tactflow ros2 topics` lists"
+                )
             }
         }
     }
+
+    /// Says where messages of a type are read, if not what is heard in the domain.
+    fn who_reads(&self, kind: &str) -> String {
+        let read = self.offers().into_iter().filter(|offer| offer.readers > 0 && offer.kind == kind);
+        let topics: Vec<String> = read.map(|offer| format!("`{}`", offer.topic)).take(MAX_LISTED).collect();
+        match topics.as_slice() {
+            [] => self.neighbours(),
+            topics => {
+                format!("in the domain {}; messages of the type {kind} are read on {}", self.id, topics.join(", "))
+            }
+        }
+    }
+}
+
+/// Listens in a domain until `end`. Returns its number, and the topics that others use.
+///
+/// # Errors
+/// If the domain cannot be joined.
+#[cfg(all(feature = "cli", unix))]
+pub(crate) fn offers(
+    domain: Option<usize>,
+    network: IpAddr,
+    end: std::time::Instant,
+) -> Result<(u16, Vec<Offer>), String> {
+    let domain = Domain::join(domain_of(domain)?, network)?;
+    std::thread::sleep(end.saturating_duration_since(std::time::Instant::now()));
+    Ok((domain.id, domain.offers()))
+}
+
+fn ours() -> std::sync::MutexGuard<'static, Vec<GUID>> {
+    OURS.lock().unwrap_or_else(std::sync::PoisonError::into_inner)
+}
+
+/// Whether somebody is not of this process.
+fn is_foreign(guid: GUID) -> bool {
+    !ours().iter().any(|our| our.prefix == guid.prefix)
 }
 
 impl<M: Message> Reader<M> {
@@ -267,7 +341,7 @@ impl<M: Message> Writer<M> {
             ),
             (Some(_), _) if is_read => format!("the reader of `{name}` has not answered yet"),
             (Some(other), _) => format!("`{name}` is read as {}, and not as {kind}", other.kind),
-            (None, _) => format!("nobody reads `{name}` {}", domain.neighbours()),
+            (None, _) => format!("nobody reads `{name}` {}", domain.who_reads(kind)),
         })
     }
 }

@@ -23,6 +23,9 @@ mod sensor;
 #[cfg(all(feature = "cli", unix))]
 pub(crate) mod shown;
 
+#[cfg(all(feature = "cli", unix))]
+pub(crate) use domain::offers;
+
 pub use arm::Ros2Arm;
 pub use force::Ros2Force;
 pub use guide::Ros2Guide;

@@ -1,0 +1,56 @@
+//! `tactflow ros2 topics`: what others publish and read in a domain.
+
+use std::net::IpAddr;
+use std::time::{Duration, Instant};
+
+use tactflow_runtime::cli::{Shell, clap, table};
+
+use crate::devices::ros2::offers;
+
+/// List the topics that others publish and read, with their types
+#[derive(clap::Parser)]
+#[command(
+    name = "topics",
+    after_help = "Example:
+  tactflow ros2 topics --domain 42
+
+An arm listens on a topic that somebody reads as trajectory_msgs/msg/JointTrajectory, and its joints are published as
+sensor_msgs/msg/JointState.
+
+Exit codes: 0 there is a topic; 1 there is none; 2 the domain cannot be joined."
+)]
+pub(super) struct TopicsArgs {
+    /// The domain; that of ROS_DOMAIN_ID, or 0, if not given
+    #[arg(long, value_name = "ID", value_parser = clap::value_parser!(u16).range(0..=101))]
+    domain: Option<u16>,
+    /// Address of this machine on the network of the robot; the default reaches this machine only
+    #[arg(long, value_name = "ADDRESS", default_value = "127.0.0.1")]
+    network: IpAddr,
+    /// How long to listen
+    #[arg(long = "for", value_name = "SECONDS", value_parser = seconds, default_value = "2")]
+    duration: f64,
+}
+
+fn seconds(text: &str) -> Result<f64, String> {
+    let seconds = text.trim_end_matches('s').parse().ok().filter(|seconds| (0.1..=600.0).contains(seconds));
+    seconds.ok_or_else(|| "write seconds from 0.1 to 600".to_owned())
+}
+
+pub(super) fn run(args: &TopicsArgs, shell: &Shell) -> Result<u8, u8> {
+    let end = Instant::now() + Duration::from_secs_f64(args.duration);
+    let (domain, offers) = offers(args.domain.map(usize::from), args.network, end).map_err(|why| shell.refuse(why))?;
+    if offers.is_empty() {
+        shell.warning(format!(
+            "no topic of ROS was seen in the domain {domain} over {}: check ROS_DOMAIN_ID or `--domain`, and `--network`",
+            args.network
+        ));
+        return Ok(1);
+    }
+    let mut rows = vec![["topic", "type", "publishers", "readers"].map(String::from)];
+    rows.extend(offers.into_iter().map(|offer| {
+        let [writers, readers] = [offer.writers, offer.readers].map(|count| count.to_string());
+        [offer.topic, offer.kind, writers, readers]
+    }));
+    shell.say(table(&rows, 2, usize::MAX).trim_end());
+    Ok(0)
+}
