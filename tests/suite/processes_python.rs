@@ -197,3 +197,74 @@ fn without_the_package_that_reads_recordings_one_line_says_what_to_install() {
     let why = "a recording needs the package `mcap`: install it with `pip install mcap`\n";
     assert_eq!((refused.code, refused.err.as_str()), (1, why));
 }
+
+/// A program that fails as its argument says, beside the module `helper.py`.
+const FAILS: &str = r#"
+import sys
+import tactflow
+from tactflow import Image, Scalar
+from helper import divide
+
+@tactflow.node
+def fails(image: Image["N"]) -> {"x": Scalar["m"], "y": Scalar["m"]}:
+    if sys.argv[1] == "raises":
+        raise KeyError("no such object")
+    if sys.argv[1] == "helper":
+        return {"x": divide(1.0, 0.0)}
+    if sys.argv[1] == "library":
+        return {"x": image.cells.reshape(7, 7, 7)}
+    if sys.argv[1] == "long":
+        raise ValueError("a" * 400)
+    return {"z": 1.0} if sys.argv[1] == "strange" else (1.0, 2.0)
+
+def frames():
+    yield [[0.0, 1.0]]
+    raise RuntimeError("the cable is out")
+
+if sys.argv[1] == "pad":
+    tactflow.pad(frames(), "skin", unit="N", rows=1, cols=2, pitch=(0.004, 0.004))
+else:
+    tactflow.main(fails, [])
+"#;
+
+#[test]
+fn the_message_of_an_exception_names_the_line_of_the_program() {
+    if !has_python_module("numpy") {
+        return;
+    }
+    let (folder, package) = (tempfile::tempdir().unwrap(), workspace().join("nodes/python"));
+    let path = |name: &str| folder.path().join(name).to_str().unwrap().to_owned();
+    fs::write(path("program.py"), FAILS).unwrap();
+    fs::write(path("helper.py"), "def divide(a, b):\n    return a / b\n").unwrap();
+    let long = format!("it said `ValueError: {}... (program.py, line 16)`", "a".repeat(300 - 12 - 3 - 22));
+    for (how, why) in [
+        ("raises", "it said `KeyError: 'no such object' (program.py, line 10)`"),
+        ("helper", "it said `ZeroDivisionError: float division by zero (helper.py, line 2)`"),
+        ("library", "into shape (7,7,7) (program.py, line 14)`"),
+        ("strange", "it said `ValueError: it returns ['z'], and its outputs are ['x', 'y'] (program.py, line 7)`"),
+        (
+            "tuple",
+            "it said `ValueError: it returns a tuple: return a dictionary with its outputs ['x', 'y'] (program.py, \
+             line 7)`",
+        ),
+        ("long", &long),
+        ("pad", "it said `RuntimeError: the cable is out (program.py, line 21)`"),
+    ] {
+        let signature = ["signature", "--out", &path("program.node.toml"), "--", "python3", "program.py", how];
+        let stated = said(tool(&signature).env("PYTHONPATH", &package));
+        assert_eq!((stated.code, stated.err.as_str()), (0, ""), "{how}: {}", stated.out);
+        let program = format!(
+            "type = 'process'\nsignature = 'program.node.toml'\ncommand = ['python3', 'program.py', '{how}']\n"
+        );
+        let rest = match how {
+            "pad" => format!("[devices.pad]\n{program}"),
+            _ => format!("in.image = 'pad.image'\n{program}[devices.pad]\ntype = 'mock_pad'\nfor_s = 0.2\n"),
+        };
+        let node = if how == "pad" { "" } else { "[nodes.fails]\n" };
+        let graph = format!("graph.clock = 'pad'\nroles.pad = 'tactile_pad'\nbind.pad = 'pad'\n{node}{rest}");
+        fs::write(path("graph.toml"), graph).unwrap();
+        let failed = said(tool(&["run", &path("graph.toml"), "--for", "2s"]).env("PYTHONPATH", &package));
+        assert_eq!(failed.code, 1, "{how}: {}{}", failed.out, failed.err);
+        assert!(failed.err.contains(why), "{how}: {}", failed.err);
+    }
+}

@@ -11,6 +11,7 @@ from typing import Iterator, Optional, Sequence, Tuple, Union
 import numpy as np
 
 from .alone import try_alone
+from .failure import naming_the_line
 from .ports import VERSION, Image, Node, VectorImage
 from .protocol import (
     HEADER,
@@ -50,12 +51,10 @@ def main(what: Node, arguments: Optional[Sequence[str]] = None) -> None:
         help="with --test on .npz: distance between two tactels (default: %(default)s mm)",
     )
     parsed = parser.parse_args(arguments)
-    try:
+    with naming_the_line(getattr(what.function, "__code__", None)):
         if parsed.test:
             sys.exit(try_alone(what, parsed.test, parsed.wire, parsed.pitch * 1e-3))
         _serve(what)
-    except (BrokenPipeError, KeyboardInterrupt):
-        pass
 
 
 def _serve(what: Node) -> None:
@@ -107,12 +106,10 @@ def pad(
     if start(pipe, signature) is None:
         return
     _end_with_input()
-    try:
+    with naming_the_line(getattr(frames, "gi_code", None)):
         for number, frame in enumerate(frames, start=1):
             stamp, cells = frame if isinstance(frame, tuple) else (NO_CLOCK, frame)
             write(pipe, frame_bytes(number, stamp, answer_bytes(outputs, {output: cells})))
-    except (BrokenPipeError, KeyboardInterrupt):
-        pass
 
 
 def _end_with_input() -> None:
