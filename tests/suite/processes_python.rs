@@ -268,3 +268,29 @@ fn the_message_of_an_exception_names_the_line_of_the_program() {
         assert!(failed.err.contains(why), "{how}: {}", failed.err);
     }
 }
+
+#[test]
+fn the_node_of_the_page_prints_what_is_shown() {
+    if !has_python_module("numpy") {
+        return;
+    }
+    let page = fs::read_to_string(workspace().join("docs/processes.md")).unwrap();
+    let (_, node) = page.split_once("```python\n").unwrap();
+    let (node, _) = node.split_once("```").unwrap();
+    let folder = tempfile::tempdir().unwrap();
+    fs::write(folder.path().join("program.py"), node).unwrap();
+    record(folder.path());
+    for file in files() {
+        let tried = alone(folder.path(), file, &["image=touch.calibrate.repaired"]);
+        assert_eq!((tried.code, tried.err.as_str()), (0, ""), "{}", tried.out);
+        let head: Vec<&str> = tried.out.lines().take(2).map(|line| line.trim_end_matches(" (`--pitch`)")).collect();
+        assert!(page.contains(&format!("```text\n{}\n", head.join("\n"))), "{head:?}");
+    }
+    let out = folder.path().join("my_feature.node.toml");
+    fs::rename(folder.path().join("program.py"), folder.path().join("my_feature.py")).unwrap();
+    let mut stated = tool(&["signature", "--out", out.to_str().unwrap(), "--", "python3", "my_feature.py"]);
+    let stated = said(stated.env("PYTHONPATH", workspace().join("nodes/python")));
+    assert_eq!((stated.code, stated.err.as_str()), (0, ""), "{}", stated.out);
+    let (_, block) = stated.out.split_once("use it with\n\n").unwrap();
+    assert!(page.contains(&format!("```text\n{}\n```", block.trim_end())), "{block}");
+}
