@@ -294,3 +294,48 @@ fn the_node_of_the_page_prints_what_is_shown() {
     let (_, block) = stated.out.split_once("use it with\n\n").unwrap();
     assert!(page.contains(&format!("```text\n{}\n```", block.trim_end())), "{block}");
 }
+
+#[test]
+fn a_node_alone_gets_no_mask_of_a_contact_that_is_over() {
+    if !has_python_module("numpy") {
+        return;
+    }
+    let folder = tempfile::tempdir().unwrap();
+    let program = r#"
+import tactflow
+from tactflow import Image, Mask, Scalar
+
+@tactflow.node
+def area(image: Image["N"], region: Mask) -> {"area": Scalar["tactel"]}:
+    return None if region is None else float(region.sum())
+
+tactflow.main(area)
+"#;
+    fs::write(folder.path().join("program.py"), program).unwrap();
+    let graph = "graph.clock = 'pad'\nroles.pad = 'tactile_pad'\nbind.pad = 'pad'\n\
+        [devices.pad]\ntype = 'mock_pad'\nfor_s = 0.5\n\
+        press = [{ from_s = 0.1, to_s = 0.2 }, { from_s = 0.3, to_s = 0.4 }]\n\
+        [parts.touch]\nfile = 'builtin:parts/touch.toml'\nin.image = 'pad.image'\n";
+    fs::write(folder.path().join("graph.toml"), graph).unwrap();
+    let path = |name: &str| folder.path().join(name).to_str().unwrap().to_owned();
+    for args in [
+        &["run", &path("graph.toml"), "--record", &path("run.mcap")][..],
+        &["export", &path("run.mcap"), &path("run.npz")],
+    ] {
+        let done = said(&mut tool(args));
+        assert_eq!(done.code, 0, "{}{}", done.out, done.err);
+    }
+    for file in files() {
+        let tried = alone(folder.path(), file, &["image=pad.image", "region=touch.label.region"]);
+        assert_eq!((tried.code, tried.err.as_str()), (0, ""), "{}", tried.out);
+        let rows: Vec<Vec<&str>> = tried.out.lines().skip(3).map(|line| line.split_whitespace().collect()).collect();
+        let is_there = |from: f64, to: f64| -> Vec<bool> {
+            let timed = rows[..rows.len() - 1].iter().map(|row| (row[0].parse::<f64>().unwrap(), row[1]));
+            timed.filter(|(time, _)| (from..to).contains(time)).map(|(_, area)| area != "-").collect()
+        };
+        for (from, to, expected) in [(0.11, 0.2, true), (0.21, 0.3, false), (0.31, 0.4, true), (0.41, 0.5, false)] {
+            let found = is_there(from, to);
+            assert!(found.len() > 15 && found.iter().all(|is| *is == expected), "{file} from {from} s: {}", tried.out);
+        }
+    }
+}

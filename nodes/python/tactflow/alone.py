@@ -11,7 +11,7 @@ import numpy as np
 from .ports import Node
 from .protocol import answer_bytes, by_name
 from .recordings import Series
-from .sources import IMAGES, Source, archived, recorded, value_at
+from .sources import IMAGES, Source, archived, newest_at, recorded, value_at
 
 
 def try_alone(what: Node, path: str, wires: Sequence[str], pitch: float) -> int:
@@ -71,7 +71,7 @@ def _details(source: Source, series: Series, kind: str, unit: Any) -> str:
 
 def _run(what: Node, series: Dict[str, Series], times: np.ndarray, has_times: bool) -> int:
     params = {name: default for name, (default, _) in what.params.items()}
-    newest = {name: np.searchsorted(one.times, times, side="right") - 1 for name, one in series.items()}
+    newest = {name: newest_at(one, times) for name, one in series.items()}
     moments = [f"{moment:.4f}" if has_times else f"{moment:.0f}" for moment in times]
     titles = ["time [s]" if has_times else "frame", *_titles(what)]
     widths = [max(len(title), 11) for title in titles]

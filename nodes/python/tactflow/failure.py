@@ -29,7 +29,11 @@ def naming_the_line(code: Optional[CodeType]) -> Iterator[None]:
 
 def _report(error: Exception, code: Optional[CodeType]) -> str:
     """Returns the traceback, with the place at fault at the end of its last line."""
-    text = "".join(traceback.format_exception(type(error), error, error.__traceback__)).rstrip()
+    trace = error.__traceback__
+    while trace and _is_of_the_package(os.path.abspath(trace.tb_frame.f_code.co_filename)):
+        trace = trace.tb_next
+    # What the package finds in a result has no line of the user, and keeps its own.
+    text = "".join(traceback.format_exception(type(error), error, trace or error.__traceback__)).rstrip()
     place = _place(error, code)
     if not place:
         return text

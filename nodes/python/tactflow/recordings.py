@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from dataclasses import dataclass
-from typing import Any, Dict, List, Optional, Tuple
+from typing import Any, Dict, List, Optional, Sequence, Tuple
 
 import numpy as np
 
@@ -26,6 +26,8 @@ class Series:
     """Unit of each number of a row; one for the whole image."""
     pitch: Optional[Tuple[float, float]] = None
     """Of an image or a mask: the distance between the centres of two tactels along x and y [m]."""
+    lost: Sequence[float] = ()
+    """Times at which an image, a mask or a pose became absent [s]. Other kinds have an absent value then."""
 
 
 class Recording(Dict[str, Series]):
@@ -44,12 +46,15 @@ def open(path: str) -> Recording:  # noqa: A001
 
     recording = Recording()
     recording.info = {}
+    lost: Dict[str, List[float]] = {}
     raw: Dict[str, Tuple[Dict[str, str], List[int], List[Any]]] = {}
     with builtins.open(path, "rb") as stream:
         reader = make_reader(stream)
         for metadata in reader.iter_metadata():
             recording.info[metadata.name] = dict(metadata.metadata)
         for _, channel, message in reader.iter_messages():
+            if channel.topic == "/tactflow/lost":
+                lost.setdefault(json.loads(message.data)["port"], []).append(message.log_time * 1e-9)
             if "port" not in channel.metadata:
                 continue
             _, times, values = raw.setdefault(channel.metadata["port"], (channel.metadata, [], []))
@@ -66,6 +71,7 @@ def open(path: str) -> Recording:  # noqa: A001
             columns=columns,
             units=units,
             pitch=(size["x"], size["y"]) if size else None,
+            lost=lost.get(name, ()),
         )
     return recording
 

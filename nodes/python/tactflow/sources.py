@@ -140,6 +140,15 @@ def _sizes(path: str) -> Dict[str, Tuple[int, ...]]:
     return sizes
 
 
+def newest_at(series: Series, times: np.ndarray) -> np.ndarray:
+    """Returns the place of the newest value at each time; -1 where it is lost, or where there is none yet."""
+    newest = np.searchsorted(series.times, times, side="right") - 1
+    if not len(series.lost):
+        return newest
+    last_lost = np.concatenate([[-np.inf], series.lost])[np.searchsorted(series.lost, times, side="right")]
+    return np.where((newest >= 0) & (series.times[newest] < last_lost), -1, newest)
+
+
 def value_at(series: Series, at: int, port: Port) -> Any:
     """Returns a value as a node gets it in a graph: NaN in the file is an absent value, and so is what is not there."""
     one = None if at < 0 else series.values[at]
