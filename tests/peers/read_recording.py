@@ -32,7 +32,8 @@ region = run["touch.label.region"].values
 with tempfile.TemporaryDirectory() as folder:
     frames = os.path.join(folder, "frames.npz")
     np.savez(frames, image=image.values[-len(region):][-10:], region=region[-10:])
-    script = os.path.join(os.path.dirname(tactflow.__file__), "examples", "contact.py")
+    script = os.path.join(os.path.dirname(os.path.dirname(tactflow.__file__)), "examples", "contact.py")
     alone = subprocess.run([sys.executable, script, "--test", frames], capture_output=True, text=True, check=True)
     lines = alone.stdout.splitlines()
-    assert len(lines) == 11 and lines[0].startswith("0 x=") and lines[-1].startswith("10 frames; "), alone.stdout
+    assert lines[2] == "frame  x [m]        y [m]        pressure [N/tactel]", alone.stdout
+    assert len(lines) == 14 and lines[3].startswith("0 ") and lines[-1].startswith("10 frames; "), alone.stdout

@@ -71,6 +71,7 @@ mod points;
 mod policies;
 mod poor_controllers;
 mod processes;
+mod processes_python;
 mod quantities;
 mod rates;
 mod record;

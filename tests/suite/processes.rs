@@ -330,16 +330,10 @@ fn the_python_package_states_runs_and_reads() {
         alone.arg(examples.join("contact.py")).args(["--test", &recording]).args(wires);
         said(alone.env("PYTHONPATH", &package))
     };
-    let refused = try_alone(&[]);
-    assert!(
-        refused.code == 1 && refused.err.contains("write `--wire image=PORT` with one of pad.image, "),
-        "{}",
-        refused.err
-    );
     let tried = try_alone(&["--wire", "image=touch.calibrate.image", "--wire", "region=touch.label.region"]);
     assert!(tried.code == 0 && tried.err.is_empty(), "{}{}", tried.out, tried.err);
     assert!(tried.out.lines().last().unwrap().contains(" frames; "), "{}", tried.out);
-    let pressures = tried.out.lines().filter_map(|line| line.rsplit_once("pressure=")?.1.parse::<f64>().ok());
+    let pressures = tried.out.lines().filter_map(|line| line.split_whitespace().last()?.parse::<f64>().ok());
     let pressures: Vec<f64> = pressures.collect();
     // The last answer of the run was that to one of the last frames.
     let script = "import sys, tactflow; print(tactflow.open(sys.argv[1])['contact.pressure'].values[-1])";
