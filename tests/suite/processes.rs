@@ -172,13 +172,13 @@ fn no_process_stays_behind_however_the_run_ends() {
 }
 
 #[test]
-fn an_answer_that_is_too_old_when_it_comes_is_counted_and_names_its_period() {
+fn an_answer_that_takes_too_long_is_counted_and_names_its_period() {
     let slow = run_with(&[&program("slow")], &["--realtime"]);
-    let wanted = "and is too old after 5 times its `period_ms` of 20 ms";
+    let wanted = "so its values are older than 5 times `period_ms` (20 ms) before the next ones come";
     assert_eq!(slow.err.matches(wanted).count(), 1, "{}", slow.err);
-    assert!(slow.out.contains("late answers"), "{}", slow.out);
+    assert!(slow.out.contains("slow answers"), "{}", slow.out);
     let known = run_with(&[&program("slow"), "nodes.program.period_ms=160"], &["--realtime"]);
-    assert!(!known.err.contains(wanted) && !known.out.contains("late answers"), "{}{}", known.out, known.err);
+    assert!(!known.err.contains(wanted) && !known.out.contains("slow answers"), "{}{}", known.out, known.err);
 }
 
 /// Waits until something is there.

@@ -242,13 +242,18 @@ fn types() -> Vec<(String, Vec<String>)> {
     types
 }
 
-/// Nodes that write no numbers cannot write a wrong one, nor can one that begins later in the task.
-const WITHOUT_NUMBERS: [&str; 4] = ["binarize", "label", "park", "follow_surface"];
+/// Nodes that write no numbers cannot write a wrong one, nor can one that begins at the end of the task.
+const WITHOUT_NUMBERS: [&str; 3] = ["binarize", "label", "park"];
+
+/// What lets a node write something in the first two seconds: the scan begins with the contact.
+fn hurry(kind: &str) -> &'static [&'static str] {
+    if kind == "follow_surface" { &["nodes.scan.speed_m_per_s=0.01"] } else { &[] }
+}
 
 #[test]
 fn a_nan_at_each_node_in_turn_ends_the_run_and_names_it() {
     for (kind, names) in types().iter().filter(|(kind, _)| !WITHOUT_NUMBERS.contains(&kind.as_str())) {
-        let (watch, fault) = sabotage(kind, How::Nan, u64::MAX, &[]);
+        let (watch, fault) = sabotage(kind, How::Nan, u64::MAX, hurry(kind));
         let fault = fault.unwrap_or_else(|| panic!("{kind}: nothing happened"));
         assert!(names.contains(&fault.node), "{kind}: {fault}");
         assert!(fault.to_string().contains("is not a finite number in tick"), "{fault}");

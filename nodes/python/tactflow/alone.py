@@ -93,9 +93,10 @@ def _run(what: Node, series: Dict[str, Series], times: np.ndarray, has_times: bo
                 bad.add(name)
                 when = f"at {moment} s" if has_times else f"in frame {moment}"
                 _warn_of(name, text, when)
-    if durations:
-        middle, late = np.percentile(np.array(durations) * 1e3, [50, 99])
-        print(f"{len(times)} frames; {middle:.3f} ms each, and {late:.3f} ms for the slowest in a hundred")
+    if not durations:
+        raise SystemExit("there is no value of any input")
+    middle, late = np.percentile(np.array(durations) * 1e3, [50, 99])
+    print(f"{len(times)} frames; {middle:.3f} ms each, and {late:.3f} ms for the slowest in a hundred")
     return 1 if bad else 0
 
 

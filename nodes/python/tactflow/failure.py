@@ -20,11 +20,19 @@ def naming_the_line(code: Optional[CodeType]) -> Iterator[None]:
     """Ends the program when its part raises. ``code`` is that part: it stands for what it returns, if that is wrong."""
     try:
         yield
-    except (BrokenPipeError, KeyboardInterrupt):
+    except KeyboardInterrupt:
         pass
     except Exception as error:
+        if isinstance(error, BrokenPipeError) and _is_of_the_package(_deepest(error)):
+            # Whoever reads what this program writes is gone.
+            return
         print(_report(error, code), file=sys.stderr, flush=True)
         sys.exit(1)
+
+
+def _deepest(error: Exception) -> str:
+    """Returns the file whose line raised an error."""
+    return os.path.abspath(traceback.extract_tb(error.__traceback__)[-1].filename)
 
 
 def _report(error: Exception, code: Optional[CodeType]) -> str:

@@ -102,6 +102,10 @@ def archived(path: str, pitch: float) -> Source:
 
     def series(names: List[str], columns: List[str]) -> Series:
         arrays = [archive[name] for name in names]
+        lengths = {len(array) for array in arrays}
+        if has_times and lengths != {len(archive["time"])}:
+            held = ", ".join(f"{len(array)} of `{name}`" for name, array in zip(names, arrays))
+            raise SystemExit(f"{path} has {len(archive['time'])} times, and {held}")
         times = archive["time"] if has_times else np.arange(len(arrays[0]), dtype=float)
         values = arrays[0] if not columns else np.stack(arrays, axis=1)
         return Series(times, values, "", columns, [units.get(name, "") for name in names], (pitch, pitch))

@@ -75,7 +75,7 @@ pub type Measured = Vec<(Range<usize>, Item)>;
 
 /// Collects the mistakes in parameters.
 pub struct Reader<'a> {
-    sources: &'a SourceMap,
+    pub(crate) sources: &'a SourceMap,
     /// Range of the numbers in the current field.
     pub(super) bounds: Option<Bounds>,
     /// Unit of the numbers in the current field, as declared.

@@ -26,22 +26,22 @@ impl Beside {
     pub(super) fn new(launch: Arc<Launch>, ports: Ports) -> Self {
         Self { launch, ports, warned: None }
     }
-}
 
-impl Beside {
-    /// Counts an answer that took so long that it is too old when it comes, and says what to write instead.
+    /// Counts an answer that took so long that its values become too old before the next ones come, and says what to write
+    /// instead. By then they are as old as two answers take.
     fn judge(&mut self, took: Duration, link: &mut Link) {
         let Launch { signature, period, .. } = &*self.launch;
-        if took <= MAX_PERIODS * *period {
+        if 2 * took <= MAX_PERIODS * *period {
             return;
         }
-        link.count("late answers");
+        link.count("slow answers");
         if self.warned.is_none_or(|at| at.elapsed() >= WARN) {
             self.warned = Some(Instant::now());
             let [took, period] = [took, *period].map(|time| time.as_secs_f64() * 1e3);
             tracing::warn!(
-                "an answer of `{}` took {took:.0} ms, and is too old after {MAX_PERIODS} times its `period_ms` of {period} ms, \
-                 unless the graph says otherwise: write the time that an answer takes as `period_ms`",
+                "an answer of `{}` took {took:.0} ms, so its values are older than {MAX_PERIODS} times `period_ms` ({period} ms) \
+                 before the next ones come, and too old unless the graph says otherwise: write the time that an answer \
+                 takes as `period_ms`",
                 signature.name
             );
         }

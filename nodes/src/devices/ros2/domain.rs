@@ -26,7 +26,7 @@ pub(super) const MAX_DOMAIN: usize = 101;
 #[cfg(all(feature = "cli", unix))]
 const SHOWN_DEPTH: i32 = 10;
 
-/// The participants of this process: two devices of a bench are no strangers to each other.
+/// The participants of this process. A message does not list their topics: somebody who reads it looks for the others.
 static OURS: Mutex<Vec<GUID>> = Mutex::new(Vec::new());
 
 /// Number of topics that a message lists.
@@ -38,6 +38,7 @@ const MAX_TRUSTED: usize = 16;
 /// A participant of a domain.
 pub(super) struct Domain {
     id: u16,
+    network: IpAddr,
     participant: DomainParticipant,
     publisher: Publisher,
     subscriber: Subscriber,
@@ -112,7 +113,7 @@ impl Domain {
         let publisher = participant.create_publisher(&qos).map_err(|error| failed(&error))?;
         let subscriber = participant.create_subscriber(&qos).map_err(|error| failed(&error))?;
         ours().push(participant.guid());
-        Ok(Self { id, participant, publisher, subscriber })
+        Ok(Self { id, network, participant, publisher, subscriber })
     }
 
     /// Reads a topic: best effort, which every writer offers, and the newest message only.
@@ -155,26 +156,29 @@ impl Domain {
     /// Returns who else writes a topic.
     pub(super) fn writers(&self, name: &str) -> Vec<Peer> {
         let topic = dds_name(name);
-        self.all_writers().filter(|(of, _)| *of == topic).map(|(_, peer)| peer).collect()
+        self.all_writers().filter(|(of, peer)| *of == topic && self.is_other(peer.guid)).map(|(_, peer)| peer).collect()
     }
 
     /// Returns who else reads a topic.
     pub(super) fn readers(&self, name: &str) -> Vec<Peer> {
         let topic = dds_name(name);
-        self.all_readers().filter(|(of, _)| *of == topic).map(|(_, peer)| peer).collect()
+        self.all_readers().filter(|(of, peer)| *of == topic && self.is_other(peer.guid)).map(|(_, peer)| peer).collect()
     }
 
-    /// Returns who else writes, each with the topic on the wire.
+    /// Whether somebody is another participant. Two arms of one bench are two: only one may command a topic.
+    fn is_other(&self, guid: GUID) -> bool {
+        guid.prefix != self.participant.guid().prefix
+    }
+
+    /// Returns who writes, each with the topic on the wire.
     fn all_writers(&self) -> impl Iterator<Item = (String, Peer)> {
         let found = self.participant.discovered_writers().into_iter().map(|writer| writer.publication_topic_data);
-        let found = found.filter(|data| is_foreign(data.key));
         found.map(|data| (data.topic_name, Peer { guid: data.key, kind: ros_type(&data.type_name) }))
     }
 
-    /// Returns who else reads, each with the topic on the wire.
+    /// Returns who reads, each with the topic on the wire.
     fn all_readers(&self) -> impl Iterator<Item = (String, Peer)> {
         let found = self.participant.discovered_readers().into_iter();
-        let found = found.filter(|reader| is_foreign(reader.reader_proxy.remote_reader_guid));
         found.map(|reader| {
             let data = reader.subscription_topic_data;
             let kind = ros_type(data.type_name());
@@ -182,12 +186,12 @@ impl Domain {
         })
     }
 
-    /// Returns the topics of ROS that others use, by name.
+    /// Returns the topics of ROS that programs other than this one use, by name.
     pub(crate) fn offers(&self) -> Vec<Offer> {
         let mut counts: BTreeMap<(String, String), [usize; 2]> = BTreeMap::new();
         let writers = self.all_writers().map(|found| (found, 0));
         for ((topic, peer), side) in writers.chain(self.all_readers().map(|found| (found, 1))) {
-            if let Some(name) = topic.strip_prefix("rt/") {
+            if let Some(name) = topic.strip_prefix("rt/").filter(|_| is_foreign(peer.guid)) {
                 counts.entry((format!("/{name}"), peer.kind)).or_default()[side] += 1;
             }
         }
@@ -220,9 +224,10 @@ impl Domain {
             [] => format!("in the domain {id}, where no topic of ROS is published: check `domain` and `network`"),
             few if few.len() <= MAX_LISTED => format!("in the domain {id}; published there: {}", few.join(", ")),
             many => {
-                let (few, more) = (many[..MAX_LISTED].join(", "), many.len() - MAX_LISTED);
+                let (few, more, network) = (many[..MAX_LISTED].join(", "), many.len() - MAX_LISTED, self.network);
                 format!(
-                    "in the domain {id}; published there: {few} and {more} more, which `tactflow ros2 topics` lists"
+                    "in the domain {id}; published there: {few} and {more} more: `tactflow ros2 topics --domain {id} \
+                     --network {network}` lists them"
                 )
             }
         }
@@ -231,7 +236,7 @@ impl Domain {
     /// Says where messages of a type are read, if not what is heard in the domain.
     fn who_reads(&self, kind: &str) -> String {
         let read = self.offers().into_iter().filter(|offer| offer.readers > 0 && offer.kind == kind);
-        let topics: Vec<String> = read.map(|offer| format!("`{}`", offer.topic)).take(MAX_LISTED).collect();
+        let topics: Vec<String> = read.map(|offer| format!("`{}`", offer.topic)).collect();
         match topics.as_slice() {
             [] => self.neighbours(),
             topics => {
@@ -254,6 +259,12 @@ pub(crate) fn offers(
     let domain = Domain::join(domain_of(domain)?, network)?;
     std::thread::sleep(end.saturating_duration_since(std::time::Instant::now()));
     Ok((domain.id, domain.offers()))
+}
+
+impl Drop for Domain {
+    fn drop(&mut self) {
+        ours().retain(|guid| *guid != self.participant.guid());
+    }
 }
 
 fn ours() -> std::sync::MutexGuard<'static, Vec<GUID>> {

@@ -180,7 +180,9 @@ impl Hearing {
         clock.hear(now, arrived, stamp);
         let why_not = clock.why_not(topic);
         if self.clocks.len() > CLOCKS {
-            self.clocks.remove(0);
+            let guide = self.guide.as_ref().map(|(guide, _)| *guide);
+            let oldest = self.clocks.iter().position(|(known, _)| Some(*known) != guide);
+            oldest.map(|oldest| self.clocks.remove(oldest));
         }
         if let Some(why) = why_not {
             return Err(why);
@@ -253,14 +255,20 @@ mod tests {
     fn a_publisher_with_another_clock_keeps_nobody_from_guiding() {
         let mut hearing = Hearing::new("/guide".into(), "pad".into(), 50 * MS);
         let (begin, arrived) = (Instant::now(), 1_700_000_000_000 * MS);
-        for i in 1..200_u8 {
-            let (now, arrived) = (begin + 10 * Duration::from_millis(i.into()), arrived + 10 * i64::from(i) * MS);
-            // Each of them is another one, and in the end there are many.
-            let wrong = hearing.take(&message("pad", arrived + 9000 * MS), GUID::from_bytes([i; 16]), now, arrived);
+        let mut at = |ms: u64, writer: u8, ahead: i64| {
+            let (now, arrived) = (begin + Duration::from_millis(ms), arrived + ms as i64 * MS);
+            hearing.take(&message("pad", arrived + ahead), GUID::from_bytes([writer; 16]), now, arrived)
+        };
+        // Many publishers with a wrong clock come first.
+        for i in 2..200 {
+            let wrong = at(u64::from(i), i, 9000 * MS);
             assert!(wrong.as_ref().is_err_and(|why| why.contains("ahead of the clock")), "{wrong:?}");
-            let right = hearing.take(&message("pad", arrived - MS), GUID::GUID_UNKNOWN, now, arrived);
-            assert!(right.is_ok(), "{right:?}");
-            assert!(hearing.clocks.len() <= CLOCKS);
         }
+        assert!(at(500, 1, -MS).is_ok());
+        assert!(at(510, 7, 9000 * MS).is_err_and(|why| why.contains("two programs")));
+        assert!(at(520, 1, -MS).is_ok());
+        assert!(at(1600, 7, 9000 * MS).is_err_and(|why| why.contains("ahead of the clock")));
+        assert!(at(1610, 8, -MS).is_ok());
+        assert!(hearing.clocks.len() <= CLOCKS);
     }
 }

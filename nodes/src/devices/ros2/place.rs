@@ -16,8 +16,8 @@ pub(super) struct Place {
     /// Our address on the network of the robot, such as `192.168.0.5`. The default reaches this machine only.
     #[param(default = "127.0.0.1")]
     network: String,
-    /// Time until something must have come, or must read the commands. A run ends 2 s after its start without a sample, and
-    /// does not know why if this is longer.
+    /// Time until something must have come, or must read the commands. Keep it below 2 s: a task that gets no first sample
+    /// until then is halted, and its message would have no reason yet.
     #[param(unit = "s", range = 0.1..=120.0, default = 1.5)]
     connect_s: f64,
 }

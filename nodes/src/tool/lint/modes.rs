@@ -10,7 +10,7 @@ use crate::tool::control::law::Feature;
 use crate::tool::control::settings::source;
 
 /// Nodes that guide the sensor along the object, and do not press.
-const GUIDES: [&str; 5] = ["scan_guide", "ridge_guide", "hold_pose", "follow_path", "park"];
+const GUIDES: [&str; 6] = ["scan_guide", "ridge_guide", "hold_pose", "follow_path", "follow_surface", "park"];
 
 pub(super) fn check(arm: &Controlled<'_>, found: &mut Diagnostics) {
     for mode in &arm.modes {

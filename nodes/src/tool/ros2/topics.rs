@@ -3,7 +3,7 @@
 use std::net::IpAddr;
 use std::time::{Duration, Instant};
 
-use tactflow_runtime::cli::{Shell, clap, table};
+use tactflow_runtime::cli::{Shell, clap, duration, table};
 
 use crate::devices::ros2::offers;
 
@@ -14,8 +14,8 @@ use crate::devices::ros2::offers;
     after_help = "Example:
   tactflow ros2 topics --domain 42
 
-An arm listens on a topic that somebody reads as trajectory_msgs/msg/JointTrajectory, and its joints are published as
-sensor_msgs/msg/JointState.
+An arm listens on a topic that somebody reads as trajectory_msgs/msg/JointTrajectory, or as the type that `message` of
+the bench chooses. Its joints are published as sensor_msgs/msg/JointState.
 
 Exit codes: 0 there is a topic; 1 there is none; 2 the domain cannot be joined."
 )]
@@ -27,13 +27,8 @@ pub(super) struct TopicsArgs {
     #[arg(long, value_name = "ADDRESS", default_value = "127.0.0.1")]
     network: IpAddr,
     /// How long to listen
-    #[arg(long = "for", value_name = "SECONDS", value_parser = seconds, default_value = "2")]
+    #[arg(long = "for", value_name = "TIME", value_parser = duration, default_value = "2s")]
     duration: f64,
-}
-
-fn seconds(text: &str) -> Result<f64, String> {
-    let seconds = text.trim_end_matches('s').parse().ok().filter(|seconds| (0.1..=600.0).contains(seconds));
-    seconds.ok_or_else(|| "write seconds from 0.1 to 600".to_owned())
 }
 
 pub(super) fn run(args: &TopicsArgs, shell: &Shell) -> Result<u8, u8> {

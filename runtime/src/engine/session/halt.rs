@@ -77,8 +77,8 @@ impl HaltMachine {
         self.state == HaltState::Running || self.state == HaltState::Held && policy == Policy::Stop
     }
 
-    /// Starts a halt of a task, whose name is empty for the graph itself. A hold that gets another reason goes on: it lasts
-    /// as long as the commands have rested.
+    /// Starts a halt of a task, whose name is empty for the graph itself. A halt that gets another reason goes on: a hold
+    /// counts from the first one, and a stop stays a stop.
     pub(crate) fn halt(&mut self, task: &str, policy: Policy, fault: Fault) {
         self.end(fault.time);
         if !self.is_halted() {
@@ -93,7 +93,10 @@ impl HaltMachine {
         } else {
             self.unlisted += 1;
         }
-        self.state = if policy == Policy::Stop { HaltState::Stopped } else { HaltState::Held };
+        self.state = match (self.state, policy) {
+            (HaltState::Stopped, _) | (_, Policy::Stop) => HaltState::Stopped,
+            _ => HaltState::Held,
+        };
     }
 
     /// Does not count the time of a hold up to `now` [ns].
@@ -107,12 +110,13 @@ impl HaltMachine {
         let resumes = std::mem::take(&mut self.resumes);
         let previous = self.state;
         match (previous, has_trouble) {
-            (HaltState::Held, false) => self.state = HaltState::Running,
-            (HaltState::Stopped, false) if resumes => self.state = HaltState::Running,
-            (HaltState::Held, true) if now - self.since > MAX_HOLD => {
+            // Also if no tick came in the meantime.
+            (HaltState::Held, _) if now - self.since > MAX_HOLD => {
                 self.stop(task);
                 return false;
             }
+            (HaltState::Held, false) => self.state = HaltState::Running,
+            (HaltState::Stopped, false) if resumes => self.state = HaltState::Running,
             _ => return false,
         }
         self.end(now);
@@ -174,6 +178,17 @@ mod tests {
             }
             assert!(halts.list.iter().all(|halt| halt.until.is_some()));
         }
+    }
+
+    #[test]
+    fn a_hold_that_no_tick_ended_within_a_second_is_a_stop() {
+        let mut halts = HaltMachine::new();
+        halts.halt("", Policy::Hold, fault());
+        halts.update("", true, 900_000_000);
+        halts.update("", false, 5_000_000_000);
+        assert!(halts.is_stopped());
+        halts.halt("", Policy::Hold, fault());
+        assert!(halts.is_stopped(), "a stop stays a stop");
     }
 
     #[test]

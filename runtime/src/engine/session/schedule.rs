@@ -19,13 +19,15 @@ pub(crate) struct TickSchedule {
     /// Time of the last tick [ns].
     last: Option<i64>,
     is_on_timer: bool,
+    /// Whether the clock device has had more time once, after a late tick, since its last sample.
+    has_waited: bool,
     /// Whether the clock device has sampled at all.
     has_started: bool,
 }
 
 impl TickSchedule {
     pub(crate) const fn new(clock: Clock, period: i64) -> Self {
-        Self { clock, period, last: None, is_on_timer: false, has_started: false }
+        Self { clock, period, last: None, is_on_timer: false, has_waited: false, has_started: false }
     }
 
     /// Returns the time for which the commands of a tick are valid [ns]: longer than a clock device may be silent before
@@ -74,9 +76,11 @@ impl TickSchedule {
 
     /// Records a tick at `now` [ns]. `has_sampled`: whether the clock device has sampled since the last tick.
     pub(crate) fn ticked(&mut self, now: i64, has_sampled: bool) {
-        // After a tick that began late, the device has its time again, unless it was silent before.
+        // After a tick that began late, the device has its time again, once, and not if it was silent before.
         let was_late = self.last.is_some() && now > self.deadline() + self.period;
-        self.is_on_timer = self.clock != Clock::Rate && !has_sampled && (self.is_on_timer || !was_late);
+        let waits = was_late && !self.is_on_timer && !self.has_waited;
+        self.has_waited = !has_sampled && (self.has_waited || waits);
+        self.is_on_timer = self.clock != Clock::Rate && !has_sampled && !waits;
         self.has_started |= has_sampled;
         self.last = Some(now);
     }
@@ -110,6 +114,8 @@ mod tests {
             (150, false, true, "another late tick: it has still not sampled"),
             (160, false, true, "so the timer goes on"),
             (165, true, false, "it is back"),
+            (225, false, false, "a late tick again"),
+            (285, false, true, "and another one: it gets more time only once"),
         ] {
             schedule.ticked(now, has_sampled);
             assert_eq!(schedule.is_silent(), is_silent, "{what}");

@@ -161,9 +161,7 @@ impl<'a> Sections<'a> {
             wires.into_iter().map(move |wire| (role.clone(), wire))
         });
         let commands = commands.collect();
-        let is_empty = |value: &Value| value.as_table().is_some_and(|table| table.entries.is_empty());
-        let empty_commands =
-            root.entry("commands").filter(|(_, value)| is_empty(value)).map(|(key, _)| key.span.clone());
+        let empty_commands = self.empty_section(root, "commands");
         let limits = read_limits(root, &LimitOwner::Task, &mut self.reader);
         let policy = root.get("policy");
         let policy = policy.map(|value| (value.clone(), PolicyTable::read(value, &mut self.reader)));
@@ -351,6 +349,15 @@ impl<'a> Sections<'a> {
         });
         wires.invalid.extend(invalid);
         wires
+    }
+
+    /// Returns the span of a section that is there and empty. An inline table, `name = {}`, is none.
+    fn empty_section(&self, root: &Table, name: &str) -> Option<Range<usize>> {
+        let (key, value) = root.entry(name)?;
+        let file = self.reader.sources.file_at(key.span.start);
+        let is_section = file.text[..file.local(&key.span).start].ends_with('[');
+        let is_empty = value.as_table().is_some_and(|table| table.entries.is_empty());
+        (is_section && is_empty).then(|| key.span.clone())
     }
 
     pub(super) fn table(&mut self, value: Option<&Value>) -> Table {
