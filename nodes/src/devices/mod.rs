@@ -23,6 +23,8 @@ pub mod recording;
 pub mod replay;
 #[cfg(feature = "ros2")]
 pub mod ros2;
+#[cfg(any(feature = "process", feature = "ros2"))]
+pub(crate) mod seldom;
 #[cfg(feature = "drivers")]
 pub mod start;
 #[cfg(feature = "drivers")]

@@ -33,5 +33,5 @@ pub(crate) use plan::{
     Clock, Condition, LivePlan, Plan, PlannedCommand, PlannedDevice, PlannedExit, PlannedModes, PlannedNode,
     PlannedRole, PlannedShow, PlannedTask, PlannedView, PlannedWire, PortRef, Producer, Reach, Test,
 };
-pub use syntax::Policy;
 pub(crate) use syntax::{AgeLimit, ExitKind, PolicyTable, PortState, WORDS, into_diagnostic};
+pub use syntax::{DEFAULT_MAX_AGE_PERIODS, Policy};

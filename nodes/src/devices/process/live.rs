@@ -5,44 +5,39 @@ use std::time::{Duration, Instant};
 
 use async_trait::async_trait;
 use tactflow_runtime::device::{DeviceError, Link, Live};
+use tactflow_runtime::graph::DEFAULT_MAX_AGE_PERIODS;
 
 use super::launch::Launch;
 use super::ports::Ports;
 use super::session::Session;
-
-/// Nominal periods after which a sample is too old, where the graph says nothing else.
-const MAX_PERIODS: u32 = 5;
-/// Shortest time between two warnings.
-const WARN: Duration = Duration::from_secs(5);
+use crate::devices::seldom::Seldom;
 
 /// A program beside the tick.
 pub(super) struct Beside {
     launch: Arc<Launch>,
     ports: Ports,
-    warned: Option<Instant>,
+    warnings: Seldom,
 }
 
 impl Beside {
     pub(super) fn new(launch: Arc<Launch>, ports: Ports) -> Self {
-        Self { launch, ports, warned: None }
+        Self { launch, ports, warnings: Seldom::default() }
     }
 
     /// Counts an answer that took so long that its values become too old before the next ones come, and says what to write
     /// instead. By then they are as old as two answers take.
     fn judge(&mut self, took: Duration, link: &mut Link) {
-        let Launch { signature, period, .. } = &*self.launch;
-        if 2 * took <= MAX_PERIODS * *period {
+        let [took, period] = [took, self.launch.period].map(|time| time.as_secs_f64() * 1e3);
+        if 2.0 * took <= DEFAULT_MAX_AGE_PERIODS * period {
             return;
         }
         link.count("slow answers");
-        if self.warned.is_none_or(|at| at.elapsed() >= WARN) {
-            self.warned = Some(Instant::now());
-            let [took, period] = [took, *period].map(|time| time.as_secs_f64() * 1e3);
+        if self.warnings.is_due() {
             tracing::warn!(
-                "an answer of `{}` took {took:.0} ms, so its values are older than {MAX_PERIODS} times `period_ms` ({period} ms) \
-                 before the next ones come, and too old unless the graph says otherwise: write the time that an answer \
-                 takes as `period_ms`",
-                signature.name
+                "an answer of `{}` took {took:.0} ms, so its values are older than {DEFAULT_MAX_AGE_PERIODS} times \
+                 `period_ms` ({period} ms) before the next ones come, and too old unless the graph says otherwise: write the \
+                 time that an answer takes as `period_ms`",
+                self.launch.signature.name
             );
         }
     }

@@ -13,9 +13,8 @@ use super::message::{Message, TwistStamped};
 use super::output::wall_clock;
 use super::place::{Place, Site, check_topic};
 use crate::devices::guide::GuidePort;
+use crate::devices::seldom::Seldom;
 
-/// Shortest time between two warnings.
-const WARN: Duration = Duration::from_secs(5);
 /// How long somebody who guides keeps others from it.
 const HOLD: Duration = Duration::from_secs(1);
 /// The number of publishers whose clocks are remembered.
@@ -140,12 +139,12 @@ struct Hearing {
     clocks: Vec<(GUID, Agreement)>,
     /// Who guides, and since when nothing came from there.
     guide: Option<(GUID, Instant)>,
-    warned: Option<Instant>,
+    warnings: Seldom,
 }
 
 impl Hearing {
     fn new(topic: String, frame: String, bound: i64) -> Self {
-        Self { topic, frame, bound, clocks: Vec::new(), guide: None, warned: None }
+        Self { topic, frame, bound, clocks: Vec::new(), guide: None, warnings: Seldom::default() }
     }
 
     /// Takes a message that has arrived, also by the wall clock [ns]. Returns its age [ns] and its velocity.
@@ -194,8 +193,7 @@ impl Hearing {
 
     /// Warns, but not more often than a person reads.
     fn warn(&mut self, why: &str) {
-        if self.warned.is_none_or(|at| at.elapsed() >= WARN) {
-            self.warned = Some(Instant::now());
+        if self.warnings.is_due() {
             tracing::warn!("a message of a guide is refused: {why}");
         }
     }

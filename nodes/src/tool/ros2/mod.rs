@@ -1,5 +1,6 @@
 //! `tactflow ros2`: what a run shows to programs of ROS 2, and what they offer.
 
+mod domain;
 mod publish;
 mod statuses;
 mod topics;

@@ -1,6 +1,5 @@
 //! `tactflow ros2 publish`: ports of a run as topics, for others to see.
 
-use std::net::IpAddr;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::thread::{JoinHandle, sleep};
@@ -9,6 +8,7 @@ use std::time::{Duration, Instant};
 use tactflow_runtime::cli::{FAULTED, FoundRun, NotFound, RunArg, Shell, clap, table};
 use tactflow_runtime::socket::{Following, RunEnd};
 
+use super::domain::DomainArgs;
 use super::statuses::{of_end, of_nothing, of_run, of_silence};
 use crate::devices::ros2::shown::{Board, Naming, Status, Topics};
 
@@ -55,12 +55,8 @@ pub(super) struct PublishArgs {
     /// Publish no transforms on /tf
     #[arg(long)]
     no_tf: bool,
-    /// The domain; that of ROS_DOMAIN_ID, or 0, if not given
-    #[arg(long, value_name = "ID", value_parser = clap::value_parser!(u16).range(0..=101))]
-    domain: Option<u16>,
-    /// Address of this machine on the network of those who read; the default reaches this machine only
-    #[arg(long, value_name = "ADDRESS", default_value = "127.0.0.1")]
-    network: IpAddr,
+    #[command(flatten)]
+    domain: DomainArgs,
 }
 
 fn rate(text: &str) -> Result<f64, String> {
@@ -79,7 +75,7 @@ pub(super) fn run(args: &PublishArgs, shell: &Shell) -> Result<u8, u8> {
     let refuse = |message: String| shell.refuse(message);
     let naming = Naming { prefix: args.prefix.clone(), frames: args.frame.clone(), has_transforms: !args.no_tf };
     naming.check().map_err(refuse)?;
-    let board = Board::join(args.domain.map(usize::from), args.network).map_err(refuse)?;
+    let board = Board::join(args.domain.id(), args.domain.network).map_err(refuse)?;
     let mut said = String::new();
     loop {
         let found = find(args, shell, &board).map_err(refuse)?;

@@ -1,10 +1,10 @@
 //! `tactflow ros2 topics`: what others publish and read in a domain.
 
-use std::net::IpAddr;
 use std::time::{Duration, Instant};
 
 use tactflow_runtime::cli::{Shell, clap, duration, table};
 
+use super::domain::DomainArgs;
 use crate::devices::ros2::offers;
 
 /// List the topics that others publish and read, with their types
@@ -20,12 +20,8 @@ the bench chooses. Its joints are published as sensor_msgs/msg/JointState.
 Exit codes: 0 there is a topic; 1 there is none; 2 the domain cannot be joined."
 )]
 pub(super) struct TopicsArgs {
-    /// The domain; that of ROS_DOMAIN_ID, or 0, if not given
-    #[arg(long, value_name = "ID", value_parser = clap::value_parser!(u16).range(0..=101))]
-    domain: Option<u16>,
-    /// Address of this machine on the network of the robot; the default reaches this machine only
-    #[arg(long, value_name = "ADDRESS", default_value = "127.0.0.1")]
-    network: IpAddr,
+    #[command(flatten)]
+    domain: DomainArgs,
     /// How long to listen
     #[arg(long = "for", value_name = "TIME", value_parser = duration, default_value = "2s")]
     duration: f64,
@@ -33,11 +29,11 @@ pub(super) struct TopicsArgs {
 
 pub(super) fn run(args: &TopicsArgs, shell: &Shell) -> Result<u8, u8> {
     let end = Instant::now() + Duration::from_secs_f64(args.duration);
-    let (domain, offers) = offers(args.domain.map(usize::from), args.network, end).map_err(|why| shell.refuse(why))?;
+    let (domain, offers) = offers(args.domain.id(), args.domain.network, end).map_err(|why| shell.refuse(why))?;
     if offers.is_empty() {
         shell.warning(format!(
             "no topic of ROS was seen in the domain {domain} over {}: check ROS_DOMAIN_ID or `--domain`, and `--network`",
-            args.network
+            args.domain.network
         ));
         return Ok(1);
     }

@@ -22,8 +22,8 @@ pub(crate) use limits::{LimitOwner, LimitSection};
 pub(crate) use live::LiveEntry;
 pub(crate) use modes::{ExitKind, ExitTable, ModeBlock, ModeExit, PortState};
 pub(crate) use names::Use;
-pub use policy::Policy;
 pub(crate) use policy::{AgeLimit, OnFail, PolicyTable, default_max_age_ns, default_max_age_s};
+pub use policy::{DEFAULT_MAX_AGE_PERIODS, Policy};
 pub(crate) use record::RecordTable;
 pub(crate) use reserved::{
     ALLOW_UNCALIBRATED, INPUTS, LIMITS, LIVE, MODES, NO_ARM, ROBOT, SENSOR, TASK_SECTIONS, WORDS,

@@ -38,7 +38,7 @@ pub(crate) enum OnFail {
 }
 
 /// Periods after which a value is too old, unless the graph sets another limit.
-const DEFAULT_MAX_AGE_PERIODS: f64 = 5.0;
+pub const DEFAULT_MAX_AGE_PERIODS: f64 = 5.0;
 
 /// Returns the default maximum age of values that arrive every `period` [s], in seconds.
 pub(crate) fn default_max_age_s(period: f64) -> f64 {
