@@ -34,6 +34,13 @@ pub(crate) fn explained(args: &[&str]) -> Value {
     serde_json::from_str(&said.out).unwrap()
 }
 
+/// The factor of a schedule on the control of a feature in a tick.
+fn factor(schedule: &Value, row: &BTreeMap<String, f64>) -> f64 {
+    let Some(ratio) = row.get("stiffness.ratio").filter(|_| schedule.is_object()) else { return 1.0 };
+    let bound = |key: &str| schedule[key].as_f64().unwrap();
+    (1.0 / ratio).clamp(bound("min"), bound("max"))
+}
+
 /// Asserts that the twist of each tick is the sum of the columns times the controls and of the constants, and that a
 /// control without integral and derivative is kp times its error.
 fn assert_is_the_law_of_a_run(graph: &str, sum: &str, for_s: &str) {
@@ -53,7 +60,8 @@ fn assert_is_the_law_of_a_run(graph: &str, sum: &str, for_s: &str) {
                 let by_hand = feature["kp"].as_f64().unwrap() * error;
                 assert!((control - by_hand).abs() < 1e-9, "{graph}, {name}: {control} and {by_hand}");
             }
-            (0..6).for_each(|i| twist[i] += feature["column"][i].as_f64().unwrap() * control);
+            let factor = factor(&feature["schedule"], row);
+            (0..6).for_each(|i| twist[i] += feature["column"][i].as_f64().unwrap() * control * factor);
         }
         for constant in mode["constants"].as_array().unwrap() {
             (0..6).for_each(|i| twist[i] += constant["twist"][i].as_f64().unwrap());
@@ -85,9 +93,9 @@ fn what_a_mode_sets_counts() {
     assert_eq!(approach["constants"][0]["twist"][2], 0.015);
     assert_eq!((&servo["features"][0]["kp"], servo["constants"].as_array().unwrap().len()), (&3.0.into(), 0));
     let pressure = servo["features"].as_array().unwrap().iter().find(|one| one["name"] == "pressure").unwrap();
-    // A low-pass of 100 ms, and half of nine periods of 4 ms.
+    // A low-pass of 50 ms, and half of nine periods of 4 ms.
     let delay: f64 = pressure["filters"].as_array().unwrap().iter().map(|one| one["delay_s"].as_f64().unwrap()).sum();
-    assert!((delay - 0.118).abs() < 1e-9, "{delay}");
+    assert!((delay - 0.068).abs() < 1e-9, "{delay}");
     assert_eq!(servo["ends"][0][0], "on_lost");
 }
 

@@ -143,8 +143,7 @@ fn the_bandwidth_is_the_one_of_a_step() {
     for one in [
         step("force", "ball", "pressure", [0.10, 0.12]),
         step("force", "pen", "pressure", [0.10, 0.12]),
-        step("force", "toy_box", "pressure", [0.10, 0.12]),
-        step("rolling", "moved_ball", "pressure", [0.10, 0.12]),
+        step("force", "toy_box", "pressure", [0.10, 0.11]),
         step("edge", "edge", "pressure", [0.10, 0.12]),
         step("edge", "edge", "orientation", [FRAC_PI_2, FRAC_PI_2 + 0.04]),
         step("hold_without_slip", "dragged_box", "spare", [0.0, 0.3]),
@@ -157,13 +156,23 @@ fn the_bandwidth_is_the_one_of_a_step() {
 
 #[test]
 fn the_bandwidth_of_a_flat_response_lies_in_its_range() {
-    // The arm resonates along x, and the response stays near 71 % for more than an octave.
-    for one in [step("hybrid", "ball", "x", [0.0, 0.004]), step("hybrid", "pen", "x", [0.0, 0.004])] {
+    // The arm resonates along x, and soft foam creeps: the response stays near 71 % for more than an octave.
+    for one in [
+        step("hybrid", "ball", "x", [0.0, 0.004]),
+        step("hybrid", "pen", "x", [0.0, 0.004]),
+        step("rolling", "moved_ball", "pressure", [0.10, 0.115]),
+        step("rolling", "moved_ball", "pressure", [0.10, 0.12]),
+    ] {
         let ran = bandwidth(&one.run());
         let explained = loop_of(one.task, one.bench, one.feature);
         let [low, high] = [0, 1].map(|i| explained["margins"]["bandwidth_range_hz"][i].as_f64().unwrap());
         let is_inside = 0.8 * low < ran && ran < 1.2 * high;
-        assert!(is_inside && high < 5.0 * low, "{}: {ran} Hz, explained {low} to {high} Hz", one.bench);
+        assert!(
+            is_inside && high < 5.0 * low,
+            "{}, {}: {ran} Hz, explained {low} to {high} Hz",
+            one.bench,
+            one.feature
+        );
     }
 }
 

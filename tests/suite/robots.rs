@@ -35,7 +35,7 @@ const TASKS: [(&str, &[&str], f64, Option<usize>); 12] = [
     ("position", &["approach", "servo"], 2.0, None),
     ("rolling", &["approach", "servo"], 2.0, Some(2)),
     ("seek_ridge", &["approach", "press", "turn", "follow"], 3.0, Some(2)),
-    ("square", &["approach", "press", "trace"], 3.5, Some(0)),
+    ("square", &["approach", "press", "trace"], 4.5, Some(0)),
 ];
 
 /// The bench that a shipped task names.

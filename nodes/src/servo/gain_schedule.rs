@@ -38,16 +38,21 @@ pub struct GainSchedule {
     max: f64,
 }
 
+/// Smallest factor without `min` [1].
+pub(crate) const USUAL_MIN: f64 = 0.2;
+/// Largest factor without `max` [1].
+pub(crate) const USUAL_MAX: f64 = 1.0;
+
 /// Parameters of `gain_schedule`.
 #[derive(Debug, Clone, Param)]
 pub struct Params {
     /// Features whose control is divided.
     features: Vec<Spanned<String>>,
     /// Smallest factor.
-    #[param(unit = "1", range = 0.0..=1.0, default = 0.2)]
+    #[param(unit = "1", range = 0.0..=1.0, default = USUAL_MIN)]
     min: f64,
     /// Largest factor.
-    #[param(unit = "1", range = 1.0..=100.0, default = 1.0)]
+    #[param(unit = "1", range = 1.0..=100.0, default = USUAL_MAX)]
     max: f64,
 }
 
@@ -113,7 +118,7 @@ impl Node for GainSchedule {
 }
 
 /// Returns the inverse of a ratio within two bounds; the larger one for a ratio that is not a positive number.
-fn factor(ratio: f64, [min, max]: [f64; 2]) -> f64 {
+pub(crate) fn factor(ratio: f64, [min, max]: [f64; 2]) -> f64 {
     if ratio > 0.0 { (1.0 / ratio).clamp(min, max) } else { max }
 }
 

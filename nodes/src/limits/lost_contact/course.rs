@@ -42,7 +42,7 @@ pub struct Course {
     touched_since: Option<i64>,
     /// When that contact was first missing, if it has not come back.
     missing_since: Option<i64>,
-    /// Since when nothing has touched the pad, not even for a frame, if that contact is missing.
+    /// Since when nothing has touched the pad, not even for a frame, if that contact is missing. It ends with the search.
     untouched_since: Option<i64>,
     /// Whether the arm has begun to search for that contact.
     searches: bool,
@@ -68,7 +68,8 @@ impl Course {
             self.untouched_since.get_or_insert(now);
         }
         let Some(missing) = self.missing_since else { return Phase::Touched };
-        if touches {
+        // A touch that flickers where the arm has searched to must not let it rest there for ever.
+        if touches && !self.searches {
             self.untouched_since = Some(now);
         }
         let (gap, is_bounce) = (now - missing, missing - touched < FIRST_TOUCH_NS);

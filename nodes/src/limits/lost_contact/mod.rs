@@ -27,7 +27,7 @@ pub use lead::lead;
 /// 2. It rests until `wait_ms` after the first tick without the contact, or after the last tick in which anything touched
 ///    the pad since.
 /// 3. It searches: a motion with a part into the object is slowed down as a whole, until no corner of the pad is faster
-///    than `search_m_per_s`.
+///    than `search_m_per_s`. A touch that flickers does not end the search.
 ///
 /// The wanted motion out of the object always passes. Once a contact has lasted for 40 ms again, everything does. Just
 /// after a first touch the pad may bounce: a contact that is lost within half a second is searched at once, without a retreat

@@ -142,6 +142,17 @@ fn a_touch_for_a_moment_begins_the_rest_anew() {
 }
 
 #[test]
+fn a_touch_that_flickers_does_not_end_the_search() {
+    let mut cell = Cell::new();
+    cell.run(2000.0, true, 0.0);
+    cell.run(800.0, false, 0.0);
+    for _ in 0..10 {
+        let flicker = [cell.run(20.0, true, 0.0), cell.run(60.0, false, 0.0)].concat();
+        assert!(flicker.iter().all(is_into_the_object), "{flicker:?}");
+    }
+}
+
+#[test]
 fn a_contact_that_comes_back_soon_is_no_first_touch() {
     let mut cell = Cell::new();
     cell.run(2000.0, true, 0.003);

@@ -85,6 +85,7 @@ mod tests {
             jacobian: String::new(),
             pid: None,
             error: None,
+            schedule: None,
             filters: Vec::new(),
         };
         Loop::new(&feature, &Answer { vz: Some(gain), ..Answer::default() }, delay, 1e-4)

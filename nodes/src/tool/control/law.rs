@@ -3,8 +3,9 @@
 use serde::Serialize;
 use tactflow_runtime::graph::OutlinedBlock;
 
+use super::filters::{Filter, filters};
+use super::schedule::Schedule;
 use super::settings::{Nodes, source};
-use super::shape::Shape;
 
 /// What a twist is made of.
 #[derive(Debug, Default, Serialize)]
@@ -39,18 +40,9 @@ pub(crate) struct Feature {
     pub(crate) error: Option<String>,
     /// Filters from the measurement to the error.
     pub(crate) filters: Vec<Filter>,
-}
-
-/// A filter of a feature.
-#[derive(Debug, Clone, Serialize)]
-pub(crate) struct Filter {
-    pub(crate) node: String,
-    #[serde(rename = "type")]
-    pub(crate) kind: String,
-    /// Delay of a slow ramp [s].
-    pub(crate) delay_s: f64,
-    #[serde(skip)]
-    pub(crate) shape: Shape,
+    /// What multiplies all three gains, depending on the contact.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(crate) schedule: Option<Schedule>,
 }
 
 /// A constant twist, after the projectors.
@@ -142,7 +134,8 @@ fn feature(nodes: &Nodes<'_>, jacobian: &OutlinedBlock, name: String, column: [f
     let before = |node: &OutlinedBlock, input: &str, kind: &str| {
         source(node, input).and_then(|port| nodes.writer(port)).filter(|writer| writer.kind.text == kind)
     };
-    let pid = before(jacobian, "control", "pid");
+    let scheduled = before(jacobian, "control", "gain_schedule");
+    let pid = before(scheduled.unwrap_or(jacobian), "control", "pid");
     let gain = |which: &str| pid.and_then(|pid| nodes.number(pid, &format!("gains.{name}.{which}"))).unwrap_or(0.0);
     let behind = pid.map(|pid| before(pid, "error", "deadband").unwrap_or(pid));
     let error = behind.and_then(|node| before(node, "error", "feature_error"));
@@ -158,37 +151,7 @@ fn feature(nodes: &Nodes<'_>, jacobian: &OutlinedBlock, name: String, column: [f
     let [kp, ki, kd] = ["kp", "ki", "kd"].map(gain);
     let error = pid.and_then(|pid| source(pid, "error")).map(|port| format!("{port}.{name}"));
     let pid = pid.map(|pid| pid.name.clone());
-    Feature { column, kp, ki, kd, measured, setpoint, filters, name, jacobian: jacobian.name.clone(), pid, error }
-}
-
-/// Returns the filters behind a port, the first one first, and the port before all of them.
-fn filters(nodes: &Nodes<'_>, port: &str) -> (Vec<Filter>, Option<String>) {
-    let (mut filters, mut port) = (Vec::new(), port);
-    while let Some((node, shape, input)) =
-        nodes.writer(port).and_then(|node| Some((node, shape(nodes, node)?, source(node, "value")?)))
-    {
-        let delay_s = shape.delay(nodes.period());
-        filters.push(Filter { node: node.name.clone(), kind: node.kind.text.clone(), delay_s, shape });
-        port = input;
-    }
-    filters.reverse();
-    (filters, Some(port.to_owned()))
-}
-
-/// Returns the filter that a node is.
-fn shape(nodes: &Nodes<'_>, node: &OutlinedBlock) -> Option<Shape> {
-    let number = |path: &str| nodes.number(node, path);
-    let samples = |usual: f64| match number("window_ms") {
-        Some(ms) => (ms * 1e-3 / nodes.period()).round().max(1.0),
-        None => number("window").unwrap_or(usual),
-    };
-    match node.kind.text.as_str() {
-        "low_pass" => number("time_constant_ms")
-            .map(|ms| ms * 1e-3)
-            .or_else(|| number("cutoff_hz").map(|hz| 1.0 / (2.0 * std::f64::consts::PI * hz)))
-            .map(|time| Shape::LowPass { time }),
-        "moving_average" => Some(Shape::Mean { samples: samples(10.0) }),
-        "median" => Some(Shape::Median { samples: samples(5.0) }),
-        _ => None,
-    }
+    let schedule = scheduled.and_then(|node| Schedule::of(nodes, node, &name, measured.as_deref()));
+    let jacobian = jacobian.name.clone();
+    Feature { column, kp, ki, kd, measured, setpoint, filters, schedule, name, jacobian, pid, error }
 }

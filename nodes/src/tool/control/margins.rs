@@ -175,6 +175,7 @@ mod tests {
             jacobian: String::new(),
             pid: None,
             error: None,
+            schedule: None,
             filters: Vec::new(),
         };
         let (hz, damping) = resonance.unzip();

@@ -1,14 +1,16 @@
 //! The control law of a graph in numbers: what moves an arm, and how stable its loops are.
 //!
-//! [`law`] multiplies gains, columns and projectors. [`response`] follows one feature around its loop, with the
-//! [`contacts`] that a bench declares, [`margins`] says how far the loop is from instability, and [`choose`] finds the
-//! largest gains that keep their margins.
+//! [`law`] multiplies gains, columns and projectors, with the [`filters`] before a gain and the [`schedule`] behind it.
+//! [`response`] follows one feature around its loop, with the [`contacts`] that a bench declares, [`margins`] says how far
+//! the loop is from instability, and [`choose`] finds the largest gains that keep their margins.
 
 pub(super) mod chain;
 pub(super) mod choose;
 pub(super) mod contacts;
+pub(super) mod filters;
 pub(super) mod law;
 pub(super) mod margins;
 pub(super) mod response;
+pub(super) mod schedule;
 pub(super) mod settings;
 pub(super) mod shape;

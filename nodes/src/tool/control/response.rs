@@ -32,12 +32,13 @@ pub(crate) struct Loop {
 
 impl Loop {
     /// Returns the loop of a feature over a contact; `None` if neither the bench nor geometry says how the feature
-    /// answers the motion of its column.
+    /// answers the motion of its column, or if a schedule multiplies the gains by what is not known.
     pub(crate) fn over(feature: &Feature, contact: &Contact, period: f64) -> Option<Self> {
         let answer = contact.answer(feature.quantity()?)?;
         let latency_ms = answer.latency_ms.unwrap_or(contact.latency_ms);
         let around = Self::new(feature, &answer, latency_ms * 1e-3, period);
-        (around.gain != 0.0).then_some(around)
+        let factor = feature.schedule.as_ref().map_or(Some(1.0), |schedule| schedule.factor(&answer))?;
+        (around.gain != 0.0).then(|| around.times(factor))
     }
 
     /// Returns the loop of a feature, with the latency and the period [s].
@@ -128,7 +129,7 @@ pub(crate) fn arm(omega: f64, resonance: Option<(f64, f64)>) -> Complex<f64> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::law::Filter;
+    use super::super::filters::Filter;
     use super::*;
 
     /// Number of steps of the arm in a period.
@@ -200,6 +201,7 @@ mod tests {
             jacobian: String::new(),
             pid: None,
             error: None,
+            schedule: None,
             filters: [Shape::Mean { samples: 10.0 }, Shape::LowPass { time: 0.1 }].map(filter).into(),
         };
         let around = Loop::new(&feature, &answer, 0.0, 0.004);

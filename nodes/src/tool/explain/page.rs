@@ -10,6 +10,7 @@ use super::touch::Approach;
 use super::{Explained, ModeLaw, Motion};
 use crate::motion::COMPONENTS;
 use crate::tool::control::law::Feature;
+use crate::tool::control::schedule::Schedule;
 
 /// Columns of the table of features.
 const HEAD: [&str; 11] = ["feature", "setpoint", "vx", "vy", "vz", "wx", "wy", "wz", "kp, ki, kd", "delay", "measured"];
@@ -73,6 +74,7 @@ fn law(mode: &ModeLaw, style: &Style) -> String {
         text += &style.table(&[&[HEAD.map(str::to_owned)], &rows[..]].concat(), 1, 8);
         text += "Speeds in m/s and rad/s for an error of one unit (setpoint - measured), by kp.\n";
     }
+    text += &law.features.iter().filter(|one| one.moves()).filter_map(scheduled).collect::<String>();
     let off: Vec<String> =
         law.features.iter().filter(|one| !one.moves()).map(|one| format!("`{}`", one.name)).collect();
     if !off.is_empty() {
@@ -97,6 +99,17 @@ fn law(mode: &ModeLaw, style: &Style) -> String {
         let _ = writeln!(text, "Ends: `{key} = {value}`.");
     }
     text
+}
+
+/// Says what multiplies the gains of a feature.
+fn scheduled(feature: &Feature) -> Option<String> {
+    let Schedule { node, min, max, nominal } = feature.schedule.as_ref()?;
+    let range = format!("from {} to {}", number(*min), number(*max));
+    let by = match nominal {
+        Some(nominal) => format!("by {} over the answer of the contact to vz, {range}", number(*nominal)),
+        None => format!("{range}, by what this command does not know: there are no margins"),
+    };
+    Some(format!("`{node}` multiplies the gains of `{}` {by}.\n", feature.name))
 }
 
 fn approach(approach: &Approach) -> String {
@@ -172,7 +185,7 @@ fn loops(loops: &[Stability], style: &Style) -> String {
         let how = if margins.is_stable { "the largest peak" } else { "it is not stable" };
         let _ = writeln!(text, "The worst loop is that of {}: {how}.", place(one));
     }
-    for one in loops.iter().filter(|one| one.margins.is_none()) {
+    for one in loops.iter().filter(|one| one.margins.is_none() && !one.is_unknown) {
         let _ = writeln!(
             text,
             "No margins of {}: the bench does not say how it answers. `tactflow tune` measures it.",

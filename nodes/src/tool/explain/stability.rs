@@ -17,6 +17,9 @@ pub(super) struct Stability {
     pub(super) feature: String,
     /// Whether geometry alone says how the feature answers: without the resonance of the arm.
     pub(super) by_geometry: bool,
+    /// Whether a schedule multiplies the gains by what this command does not know.
+    #[serde(skip)]
+    pub(super) is_unknown: bool,
     /// `None` if nothing says how the feature answers.
     pub(super) margins: Option<Margins>,
 }
@@ -31,6 +34,7 @@ pub(super) fn stability(declared: &[Contact], law: &Law, period: f64) -> Vec<Sta
             object: Some(contact.object.clone()).filter(|object| !object.is_empty()),
             feature: feature.name.clone(),
             by_geometry: feature.quantity().is_some_and(|quantity| contact.is_by_geometry(quantity)),
+            is_unknown: feature.schedule.as_ref().is_some_and(|schedule| schedule.nominal.is_none()),
             margins: Loop::over(feature, contact, period).map(|around| margins(&around)),
         })
     });

@@ -238,6 +238,9 @@ impl Experiment<'_> {
         }
         let Feature { kp, ki, kd, column, .. } = *self.feature;
         set.extend(gains(self.feature, self.mode, [kp / 2.0, ki / 2.0, kd / 2.0]));
+        // Otherwise the gains would change while they are measured.
+        let schedule = self.feature.schedule.iter();
+        set.extend(schedule.flat_map(|one| ["min", "max"].map(|key| format!("nodes.{}.{key}=1.0", one.node))));
         if column.iter().filter(|entry| **entry != 0.0).count() > 1 {
             let mut alone = [0.0; 6];
             alone[self.component] = column[self.component];

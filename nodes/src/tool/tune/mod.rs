@@ -6,6 +6,7 @@ mod fit;
 mod lift;
 mod page;
 mod save;
+mod target;
 mod trial;
 
 use std::collections::BTreeMap;
@@ -14,19 +15,20 @@ use std::path::{Path, PathBuf};
 use serde::Serialize;
 use tactflow_runtime::cli::clap::{self, ValueEnum};
 use tactflow_runtime::cli::{GraphArgs, Shell};
-use tactflow_runtime::graph::{Outline, OutlinedMode, Request, compile};
+use tactflow_runtime::graph::{Outline, Request, compile};
 
 use super::arguments::{may_draw, write};
 use super::control::chain::chain;
 use super::control::choose::{Wanted, factor};
 use super::control::contacts::{Answer, Contact};
-use super::control::law::{Feature, law};
+use super::control::law::Feature;
 use super::control::margins::{Margins, margins};
 use super::control::response::Loop;
 use super::control::settings::{self, Index, Nodes};
 use crate::motion::COMPONENTS;
 use experiment::{Answered, Experiment, Line};
 use fit::{ENOUGH, Fit, fit};
+use target::{adder, controlled};
 use trial::Settled;
 
 /// Measure how the features answer the motion, and propose gains with margins
@@ -241,49 +243,6 @@ fn tune(args: &TuneArgs, shell: &Shell, request: &Request, outline: &Outline) ->
         tuned.settled.extend(trial::compare(shell.catalogue(), &request, mode, &tuned.features, &contact.object)?);
     }
     Ok(tuned)
-}
-
-/// Returns the mode that is tuned, and its features.
-fn controlled<'o>(args: &TuneArgs, index: &Index<'o>, twist: &str) -> Result<(&'o OutlinedMode, Vec<Feature>), String> {
-    let task = index.task_of(twist);
-    if !task.is_empty() {
-        return Err(format!("the arm follows the part `{task}`: tune the file of this part alone, on the same bench"));
-    }
-    let moving = |mode: &OutlinedMode| {
-        let law = law(&Nodes::new(index, Some(mode)), twist);
-        law.features.into_iter().filter(|feature| feature.moves() && feature.kp > 0.0).collect::<Vec<_>>()
-    };
-    let modes: Vec<&OutlinedMode> = index.modes(task).into_iter().flatten().collect();
-    let mode = match &args.mode {
-        Some(name) => modes.iter().find(|mode| mode.name == *name).ok_or_else(|| {
-            let names: Vec<String> = modes.iter().map(|mode| format!("`{}`", mode.name)).collect();
-            format!("the graph has no mode `{name}`; its modes are {}", names.join(", "))
-        })?,
-        None => modes
-            .iter()
-            .max_by_key(|mode| moving(mode).len())
-            .ok_or("a graph without modes has no mode to tune: add a mode, as docs/composing-a-task.md shows")?,
-    };
-    let features = moving(mode);
-    let known: Vec<String> = features.iter().map(|feature| format!("`{}`", feature.name)).collect();
-    if let Some(unknown) = args.features.iter().find(|name| features.iter().all(|feature| feature.name != **name)) {
-        return Err(format!("the mode `{}` does not control `{unknown}`; it controls {}", mode.name, known.join(", ")));
-    }
-    let is_asked = |feature: &Feature| args.features.is_empty() || args.features.contains(&feature.name);
-    let features: Vec<Feature> = features.into_iter().filter(is_asked).collect();
-    match features.is_empty() {
-        true => Err(format!("the mode `{}` controls no feature with a `pid`", mode.name)),
-        false => Ok((*mode, features)),
-    }
-}
-
-/// Returns the node that adds the test signal to the motion.
-fn adder(index: &Index<'_>, twist: &str) -> Result<String, String> {
-    let writer = Nodes::new(index, None).writer(twist).filter(|node| node.kind.text == "twist_adder");
-    let help = "add one, so that the test signal has a way in:\n\n[nodes.sum]\ntype = \"twist_adder\"\nin.touch = ";
-    writer
-        .map(|node| node.name.clone())
-        .ok_or_else(|| format!("the motion `{twist}` comes from no `twist_adder`; {help}\"{twist}\""))
 }
 
 /// What is measured: a bench, and a setting.

@@ -1,0 +1,172 @@
+//! `stiffness_estimate`: how much a feature changes per metre that the sensor moves along its z.
+
+mod line;
+mod travel;
+
+use tactflow_runtime::node::{
+    At, Describe, In, Inputs, Interval, Mistake, Mistakes, Node, Out, Outputs, Param, Setup, State, Tick,
+};
+use tactflow_runtime::signal::{Flag, Jacobian, Joints, Pose, Scalar};
+use tactflow_runtime::source::Code;
+
+use line::Line;
+use travel::Travel;
+
+/// Estimates how stiff a contact is: the change of a feature per metre of travel along the sensor's z.
+///
+/// A gain is best for one stiffness: the same motion changes the pressure of a stiff object more than that of a soft
+/// one, and so the gain of the whole loop is larger. This node measures it while the sensor moves, for a
+/// `gain_schedule`.
+///
+/// The slope dp/dz is that of a least-squares line through the newest samples, whose weights decay with the time
+/// `memory_s`. z is the travel of the sensor along its own z since the contact. `ratio` is the slope divided by
+/// `nominal`, the slope for which the gains were chosen: 1 is as stiff, 5 is five times as stiff.
+///
+/// **Validity.** Without motion there is nothing to learn. An estimate is `valid` if the standard deviation of the
+/// travel is at least `min_travel_m`, the correlation of feature and travel is at least `min_correlation`, and the
+/// slope is positive. `ratio` stays at the last valid estimate, and is absent until there is one. After the graph's
+/// `reset_after_ms` without the feature or the pose, the estimate begins afresh.
+///
+/// **Which travel.** With `pose` alone, z is the measured travel, and the slope is that of object and foam. A compliant
+/// arm gives way too. For the gain of a loop its spring counts as well: wire `jacobian` and `equilibrium`, and z is the
+/// travel that was commanded, n · J dq with the changes dq of the equilibrium and the normal n of the pad.
+///
+/// **Lag.** Filters, and an arm that swings, delay the feature against the travel, and make the object look softer.
+/// `lag_ms` delays the travel as a low-pass filter does. Add up the delays of the filters, the latency, and for a
+/// commanded travel the delay of the arm, which is 2 ζ / ω for a resonance. With too much lag, the object looks too stiff
+/// at first, which is safe.
+///
+/// A small `multisine` along z excites a contact that rests. Friction hides small motions: choose `min_travel_m` well
+/// above the travel in which foam and joints stick.
+///
+/// ```toml
+/// [nodes.stiffness_estimate]
+/// type = "stiffness_estimate"
+/// in.value = "moving_average.value"
+/// in.pose = "state.sensor_pose"
+/// in.jacobian = "state.jacobian"
+/// in.equilibrium = "arm.equilibrium"
+/// nominal = 10.0                      # 0.01 N per tactel for each mm [N per tactel per m]
+/// lag_ms = 70
+/// ```
+#[derive(Describe)]
+pub struct StiffnessEstimate {
+    params: Params,
+    /// Number of joints of the commanded travel; 0 for the measured one.
+    joints: usize,
+}
+
+/// Parameters of `stiffness_estimate`.
+#[derive(Debug, Clone, Param)]
+pub struct Params {
+    /// Slope at which `ratio` is 1.
+    #[param(unit = "U/m", above = 0.0)]
+    nominal: f64,
+    /// Time in which the weight of a sample decays to 37 %.
+    #[param(unit = "s", above = 0.0, default = 2.0)]
+    memory_s: f64,
+    /// Smallest standard deviation of the travel.
+    #[param(unit = "m", above = 0.0, default = 0.0002)]
+    min_travel_m: f64,
+    /// Smallest correlation of the feature and the travel.
+    #[param(unit = "1", range = 0.0..=1.0, default = 0.9)]
+    min_correlation: f64,
+    /// Delay of the feature against the travel.
+    #[param(unit = "ms", range = 0.0.., default = 0.0)]
+    lag_ms: f64,
+}
+
+/// What `stiffness_estimate` reads.
+#[derive(Inputs)]
+pub struct Inputs<'a> {
+    /// A feature that grows with the travel, such as the pressure or the force.
+    #[port(unit = "U", frame = "A")]
+    value: In<'a, Scalar>,
+    /// Pose of the sensor in the base.
+    #[port(frame = "A", reference = "B", quantity = "sensor_pose", sampled)]
+    pose: In<'a, Pose>,
+    /// Spatial Jacobian of the sensor in the base, for the commanded travel.
+    #[port(frame = "B", robot = "R", sampled)]
+    jacobian: Option<In<'a, Jacobian>>,
+    /// Posture that the commands have moved the arm to, for the commanded travel.
+    #[port(unit = "rad", robot = "R", quantity = "equilibrium", known, sampled)]
+    equilibrium: Option<In<'a, Joints>>,
+}
+
+/// What `stiffness_estimate` writes.
+#[derive(Outputs)]
+pub struct Outputs {
+    /// The last valid slope over `nominal`; absent until there is one.
+    #[port(unit = "1", frame = "A", quantity = "stiffness")]
+    ratio: Out<Scalar>,
+    /// Whether the samples determine the slope.
+    valid: Out<Flag>,
+}
+
+/// What `stiffness_estimate` remembers.
+#[derive(State)]
+pub struct State {
+    line: Line,
+    travel: Travel,
+    /// Since the last sample.
+    interval: Interval,
+    /// The last valid ratio.
+    ratio: Option<f64>,
+}
+
+impl Node for StiffnessEstimate {
+    type Params = Params;
+    type Inputs<'a> = Inputs<'a>;
+    type Outputs = Outputs;
+    type State = State;
+
+    fn new(params: Params, setup: &mut Setup<Self>) -> Result<Self, Mistakes> {
+        let wired =
+            [("jacobian", setup.inputs.jacobian.is_some()), ("equilibrium", setup.inputs.equilibrium.is_some())];
+        if let [(missing, false), (other, true)] | [(other, true), (missing, false)] = wired {
+            let message = format!("the commanded travel needs `{missing}` beside `{other}`");
+            let help = format!("wire `in.{missing}` too, or remove `in.{other}` for the measured travel");
+            return Err(Mistake::new(Code::MissingInput, At::Node, message).help(help).into());
+        }
+        let joints = setup.inputs.equilibrium.as_ref().map_or(0, |shape| shape.joints.len());
+        Ok(Self { params, joints })
+    }
+
+    fn state(&self) -> State {
+        State { line: Line::default(), travel: Travel::new(self.joints), interval: Interval::default(), ratio: None }
+    }
+
+    fn step(&self, tick: &Tick, inputs: Inputs<'_>, out: &mut Outputs, state: &mut State) {
+        let value = *inputs.value;
+        let moved = match inputs.jacobian.zip(inputs.equilibrium) {
+            Some((jacobian, equilibrium)) => state.travel.commanded(&inputs.pose, &jacobian, &equilibrium),
+            // Wired, and absent at this moment: what was commanded is not known.
+            None if self.joints > 0 => state.travel.forget(),
+            None => state.travel.measured(&inputs.pose),
+        };
+        match moved.zip(state.interval.step(&inputs.value, tick)) {
+            Some((moved, dt)) => {
+                let travel = state.travel.lagging(moved, dt, self.params.lag_ms * 1e-3);
+                state.line.add(travel, value, libm::exp(-dt / self.params.memory_s));
+            }
+            None => {
+                state.travel.catch_up();
+                state.line = Line::default().with(value);
+            }
+        }
+        if !state.line.is_finite() {
+            state.travel.catch_up();
+            state.line = Line::default();
+        }
+        let slope = state.line.slope(self.params.min_travel_m, self.params.min_correlation);
+        let ratio = slope.map(|slope| slope / self.params.nominal).filter(|ratio| ratio.is_finite());
+        state.ratio = ratio.or(state.ratio);
+        out.valid.set(ratio.is_some());
+        if let Some(ratio) = state.ratio {
+            out.ratio.set(ratio);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,62 @@
+//! The travel of a sensor along its own z, measured or commanded.
+
+use nalgebra::Vector3;
+use tactflow_runtime::node::State;
+use tactflow_runtime::signal::{Jacobian, Joints, Pose};
+
+use crate::motion::normal::along_z;
+
+/// Measures the steps of a sensor along its z, and delays them.
+#[derive(State)]
+pub(super) struct Travel {
+    /// Position of the sensor in the base at the last sample [m].
+    position: Option<Vector3<f64>>,
+    /// Equilibrium at the last sample.
+    equilibrium: Vec<f64>,
+    /// Whether that equilibrium is known.
+    is_known: bool,
+    /// The way that is not yet passed on [m].
+    behind: f64,
+}
+
+impl Travel {
+    /// Nothing is known yet of an arm with so many joints.
+    pub(super) fn new(joints: usize) -> Self {
+        Self { position: None, equilibrium: vec![0.0; joints], is_known: false, behind: 0.0 }
+    }
+
+    /// Returns the measured step since the last sample [m]; `None` for the first one.
+    pub(super) fn measured(&mut self, pose: &Pose) -> Option<f64> {
+        let position = pose.0.translation.vector;
+        let last = self.position.replace(position)?;
+        Some(pose.0.rotation.inverse_transform_vector(&(position - last)).z)
+    }
+
+    /// Returns the commanded step since the last sample [m]; `None` for the first one.
+    pub(super) fn commanded(&mut self, pose: &Pose, jacobian: &Jacobian, equilibrium: &Joints) -> Option<f64> {
+        let moved = equilibrium.0.iter().zip(&self.equilibrium).map(|(now, last)| now - last);
+        let step = along_z(pose, jacobian).zip(moved).map(|(part, moved)| part * moved).sum();
+        self.equilibrium.copy_from_slice(&equilibrium.0);
+        std::mem::replace(&mut self.is_known, true).then_some(step)
+    }
+
+    /// Forgets the last sample.
+    pub(super) fn forget(&mut self) -> Option<f64> {
+        self.is_known = false;
+        None
+    }
+
+    /// Returns the step of a travel that follows the true one as a low-pass filter with the time constant `lag` [s].
+    pub(super) fn lagging(&mut self, step: f64, dt: f64, lag: f64) -> f64 {
+        self.behind += step;
+        let share = if lag > 0.0 { -libm::expm1(-dt / lag) } else { 1.0 };
+        let passed = share * self.behind;
+        self.behind -= passed;
+        passed
+    }
+
+    /// Passes on nothing of the way before.
+    pub(super) fn catch_up(&mut self) {
+        self.behind = 0.0;
+    }
+}

@@ -1,0 +1,49 @@
+//! The factor of a `gain_schedule` on the gains of a feature.
+
+use serde::Serialize;
+use tactflow_runtime::graph::OutlinedBlock;
+
+use super::contacts::Answer;
+use super::filters::filters;
+use super::settings::{Nodes, source};
+use crate::servo::gain_schedule::{USUAL_MAX, USUAL_MIN, factor};
+
+/// A node that multiplies the gains of a feature by a factor, which depends on the contact.
+#[derive(Debug, Clone, Serialize)]
+pub(crate) struct Schedule {
+    pub(crate) node: String,
+    /// Smallest factor.
+    pub(crate) min: f64,
+    /// Largest factor.
+    pub(crate) max: f64,
+    /// The answer to `vz` for which the factor is 1; `None` if the factor follows anything but the answer of this feature
+    /// to the commanded travel.
+    pub(crate) nominal: Option<f64>,
+}
+
+impl Schedule {
+    /// Returns the schedule that a node is for a feature that a port measures; `None` if it passes the feature unchanged.
+    pub(super) fn of(nodes: &Nodes<'_>, node: &OutlinedBlock, feature: &str, measured: Option<&str>) -> Option<Self> {
+        let features: Vec<String> = nodes.value(node, "features")?.value.read()?;
+        if !features.iter().any(|name| name == feature) {
+            return None;
+        }
+        let number = |key: &str, usual: f64| nodes.number(node, key).unwrap_or(usual);
+        let (min, max) = (number("min", USUAL_MIN), number("max", USUAL_MAX));
+        Some(Self { node: node.name.clone(), min, max, nominal: nominal(nodes, node, measured?) })
+    }
+
+    /// Returns the factor over a contact with this answer; `None` if it is not known.
+    pub(super) fn factor(&self, answer: &Answer) -> Option<f64> {
+        let nominal = self.nominal?;
+        Some(answer.vz.map_or(1.0, |vz| factor(vz / nominal, [self.min, self.max])))
+    }
+}
+
+/// Returns the answer for which the factor is 1, if the ratio is that of a port over the commanded travel.
+fn nominal(nodes: &Nodes<'_>, schedule: &OutlinedBlock, measured: &str) -> Option<f64> {
+    let estimate = nodes.writer(source(schedule, "ratio")?)?;
+    let is_commanded = estimate.kind.text == "stiffness_estimate" && source(estimate, "equilibrium").is_some();
+    let (_, origin) = filters(nodes, source(estimate, "value")?);
+    (is_commanded && origin.as_deref() == Some(measured)).then(|| nodes.number(estimate, "nominal"))?
+}

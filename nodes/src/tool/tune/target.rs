@@ -1,0 +1,68 @@
+//! What is tuned: the features of one mode, and the node that takes the test signal.
+
+use tactflow_runtime::graph::OutlinedMode;
+
+use super::TuneArgs;
+use crate::tool::control::law::{Feature, law};
+use crate::tool::control::schedule::Schedule;
+use crate::tool::control::settings::{Index, Nodes};
+
+/// Returns the mode that is tuned, and its features.
+pub(super) fn controlled<'o>(
+    args: &TuneArgs,
+    index: &Index<'o>,
+    twist: &str,
+) -> Result<(&'o OutlinedMode, Vec<Feature>), String> {
+    let task = index.task_of(twist);
+    if !task.is_empty() {
+        return Err(format!("the arm follows the part `{task}`: tune the file of this part alone, on the same bench"));
+    }
+    let moving = |mode: &OutlinedMode| {
+        let law = law(&Nodes::new(index, Some(mode)), twist);
+        law.features.into_iter().filter(|feature| feature.moves() && feature.kp > 0.0).collect::<Vec<_>>()
+    };
+    let modes: Vec<&OutlinedMode> = index.modes(task).into_iter().flatten().collect();
+    let mode = match &args.mode {
+        Some(name) => modes.iter().find(|mode| mode.name == *name).ok_or_else(|| {
+            let names: Vec<String> = modes.iter().map(|mode| format!("`{}`", mode.name)).collect();
+            format!("the graph has no mode `{name}`; its modes are {}", names.join(", "))
+        })?,
+        None => modes
+            .iter()
+            .max_by_key(|mode| moving(mode).len())
+            .ok_or("a graph without modes has no mode to tune: add a mode, as docs/composing-a-task.md shows")?,
+    };
+    let features = moving(mode);
+    let known: Vec<String> = features.iter().map(|feature| format!("`{}`", feature.name)).collect();
+    if let Some(unknown) = args.features.iter().find(|name| features.iter().all(|feature| feature.name != **name)) {
+        return Err(format!("the mode `{}` does not control `{unknown}`; it controls {}", mode.name, known.join(", ")));
+    }
+    let is_asked = |feature: &Feature| args.features.is_empty() || args.features.contains(&feature.name);
+    let features: Vec<Feature> = features.into_iter().filter(is_asked).collect();
+    if features.is_empty() {
+        return Err(format!("the mode `{}` controls no feature with a `pid`", mode.name));
+    }
+    features.iter().try_for_each(has_a_known_schedule)?;
+    Ok((*mode, features))
+}
+
+/// Refuses a feature whose gains are multiplied by what nothing says.
+fn has_a_known_schedule(feature: &Feature) -> Result<(), String> {
+    let unknown = feature.schedule.as_ref().filter(|schedule| schedule.nominal.is_none());
+    unknown.map_or(Ok(()), |Schedule { node, .. }| {
+        Err(format!(
+            "`{node}` multiplies the gains of `{}` by what is not known: give it the `ratio` of a `stiffness_estimate` of \
+             the same feature, with `jacobian` and `equilibrium`",
+            feature.name
+        ))
+    })
+}
+
+/// Returns the node that adds the test signal to the motion.
+pub(super) fn adder(index: &Index<'_>, twist: &str) -> Result<String, String> {
+    let writer = Nodes::new(index, None).writer(twist).filter(|node| node.kind.text == "twist_adder");
+    let help = "add one, so that the test signal has a way in:\n\n[nodes.sum]\ntype = \"twist_adder\"\nin.touch = ";
+    writer
+        .map(|node| node.name.clone())
+        .ok_or_else(|| format!("the motion `{twist}` comes from no `twist_adder`; {help}\"{twist}\""))
+}
