@@ -92,10 +92,10 @@ fn a_compliant_arm_gives_back_its_lead_and_finds_the_object_gently() {
         let moments = run(task, 200.0, &[(PULLED_S, PULLED_S + 0.3, 0.02)], 12.0);
         let (before, after) = at_the_loss(&moments);
         let lost = after[0].toward_m;
-        // The search begins 0.5 s after the loss, and its first 3 mm are in this: the spring has not pushed the sensor on.
+        // The arm has followed the ball, and the first 3 mm of the search are in this: the spring has not pushed the sensor on.
         let settled = between(after, 1.0, 1.1);
         let mean = settled.iter().map(|moment| moment.toward_m - lost).sum::<f64>() / settled.len() as f64;
-        assert!((-0.003..0.004).contains(&mean), "{task}: {} mm from where the contact was lost", mean * 1e3);
+        assert!((-0.003..0.005).contains(&mean), "{task}: {} mm from where the contact was lost", mean * 1e3);
         let steady = greatest(between(before, 4.0, 4.9), |moment| moment.force_n);
         let found = after.iter().position(|moment| moment.force_n > 0.2).expect("the ball is still in reach");
         let touch = greatest(between(&after[found..], 0.0, 0.1), |moment| moment.force_n);
