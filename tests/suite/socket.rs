@@ -387,7 +387,7 @@ fn a_saved_value_is_the_only_change_of_the_file() {
     session.run(&[graph, "--set", "nodes.pid.gains.y.kp=5"]);
     let of_command = session.say(&["set", "pid.gains.y.kp=3", "--save"]);
     assert!(of_command.code == 2 && of_command.err.contains("comes from `--set` of the run"), "{}", of_command.err);
-    assert!(session.print(&["get", KP]).contains(" 3.5 "), "nothing has changed");
+    assert!(session.print(&["get", KP]).contains(" 5 "), "nothing has changed");
     session.end();
     session.run(&[graph]);
     std::fs::write(&path, after.replace(new, "")).unwrap();
