@@ -21,7 +21,7 @@ LAYER, SHARE, FRICTION = 150.0, 0.15, 0.2
 NAMES = ["slide_x", "slide_y", "slide_z", "roll", "pitch", "yaw"]
 LIMIT, SPEED = [0.4] * 3 + [2.9] * 3, [0.5] * 3 + [2.0] * 3
 START = [0.12, -0.07, 0.05, 0.1, -0.05, 0.4]
-# As in the robot file of the gantry [N/m, N m/rad]. With slides of 5000 N/m the pressure of `hybrid` oscillates.
+# As in the robot file of the gantry [N/m, N m/rad]. With slides of 15000 N/m the pressure of `hybrid` oscillates.
 STIFFNESS = [2000.0] * 6
 LAG = 0.03  # of each joint without a load [s]
 # The sensor on the hand: below it, aside, and turned by 30 degrees in the plane. Its z points away from the gantry.

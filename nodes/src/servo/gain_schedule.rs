@@ -39,9 +39,9 @@ pub struct GainSchedule {
 }
 
 /// Smallest factor without `min` [1].
-pub(crate) const USUAL_MIN: f64 = 0.2;
+pub(crate) const DEFAULT_MIN_FACTOR: f64 = 0.2;
 /// Largest factor without `max` [1].
-pub(crate) const USUAL_MAX: f64 = 1.0;
+pub(crate) const DEFAULT_MAX_FACTOR: f64 = 1.0;
 
 /// Parameters of `gain_schedule`.
 #[derive(Debug, Clone, Param)]
@@ -49,10 +49,10 @@ pub struct Params {
     /// Features whose control is divided.
     features: Vec<Spanned<String>>,
     /// Smallest factor.
-    #[param(unit = "1", range = 0.0..=1.0, default = USUAL_MIN)]
+    #[param(unit = "1", range = 0.0..=1.0, default = DEFAULT_MIN_FACTOR)]
     min: f64,
     /// Largest factor.
-    #[param(unit = "1", range = 1.0..=100.0, default = USUAL_MAX)]
+    #[param(unit = "1", range = 1.0..=100.0, default = DEFAULT_MAX_FACTOR)]
     max: f64,
 }
 

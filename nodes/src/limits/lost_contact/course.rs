@@ -42,7 +42,8 @@ pub struct Course {
     touched_since: Option<i64>,
     /// When that contact was first missing, if it has not come back.
     missing_since: Option<i64>,
-    /// Since when nothing has touched the pad, not even for a frame, if that contact is missing. It ends with the search.
+    /// Since when nothing has touched the pad, not even for a frame, if that contact is missing. A touch does not
+    /// restart it once the search has begun.
     untouched_since: Option<i64>,
     /// Whether the arm has begun to search for that contact.
     searches: bool,

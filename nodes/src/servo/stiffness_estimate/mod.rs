@@ -1,4 +1,4 @@
-//! `stiffness_estimate`: how much a feature changes per metre that the sensor moves along its z.
+//! `stiffness_estimate`: how much a feature changes per metre of travel along the sensor's z, measured or commanded.
 
 mod line;
 mod travel;
@@ -35,6 +35,9 @@ use travel::Travel;
 /// `lag_ms` delays the travel as a low-pass filter does. Add up the delays of the filters, the latency, and for a
 /// commanded travel the delay of the arm, which is 2 ζ / ω for a resonance. With too much lag, the object looks too stiff
 /// at first, which is safe.
+///
+/// The object must rest while the sensor moves: an object that moves by itself changes the feature without any travel, and
+/// the last estimate stays until the sensor has moved again.
 ///
 /// A small `multisine` along z excites a contact that rests. Friction hides small motions: choose `min_travel_m` well
 /// above the travel in which foam and joints stick.
@@ -86,10 +89,10 @@ pub struct Inputs<'a> {
     #[port(frame = "A", reference = "B", quantity = "sensor_pose", sampled)]
     pose: In<'a, Pose>,
     /// Spatial Jacobian of the sensor in the base, for the commanded travel.
-    #[port(frame = "B", robot = "R", sampled)]
+    #[port(frame = "B", robot = "R", optional, sampled)]
     jacobian: Option<In<'a, Jacobian>>,
     /// Posture that the commands have moved the arm to, for the commanded travel.
-    #[port(unit = "rad", robot = "R", quantity = "equilibrium", known, sampled)]
+    #[port(unit = "rad", robot = "R", quantity = "equilibrium", optional, sampled)]
     equilibrium: Option<In<'a, Joints>>,
 }
 
@@ -141,7 +144,10 @@ impl Node for StiffnessEstimate {
         let moved = match inputs.jacobian.zip(inputs.equilibrium) {
             Some((jacobian, equilibrium)) => state.travel.commanded(&inputs.pose, &jacobian, &equilibrium),
             // Wired, and absent at this moment: what was commanded is not known.
-            None if self.joints > 0 => state.travel.forget(),
+            None if self.joints > 0 => {
+                state.travel.forget();
+                None
+            }
             None => state.travel.measured(&inputs.pose),
         };
         match moved.zip(state.interval.step(&inputs.value, tick)) {
@@ -150,12 +156,12 @@ impl Node for StiffnessEstimate {
                 state.line.add(travel, value, libm::exp(-dt / self.params.memory_s));
             }
             None => {
-                state.travel.catch_up();
+                state.travel.drop_lag();
                 state.line = Line::default().with(value);
             }
         }
         if !state.line.is_finite() {
-            state.travel.catch_up();
+            state.travel.drop_lag();
             state.line = Line::default();
         }
         let slope = state.line.slope(self.params.min_travel_m, self.params.min_correlation);

@@ -41,9 +41,8 @@ impl Travel {
     }
 
     /// Forgets the last sample.
-    pub(super) fn forget(&mut self) -> Option<f64> {
+    pub(super) fn forget(&mut self) {
         self.is_known = false;
-        None
     }
 
     /// Returns the step of a travel that follows the true one as a low-pass filter with the time constant `lag` [s].
@@ -55,8 +54,8 @@ impl Travel {
         passed
     }
 
-    /// Passes on nothing of the way before.
-    pub(super) fn catch_up(&mut self) {
+    /// Discards the way that is not yet passed on.
+    pub(super) fn drop_lag(&mut self) {
         self.behind = 0.0;
     }
 }

@@ -6,7 +6,7 @@ use tactflow_runtime::graph::OutlinedBlock;
 use super::contacts::Answer;
 use super::filters::filters;
 use super::settings::{Nodes, source};
-use crate::servo::gain_schedule::{USUAL_MAX, USUAL_MIN, factor};
+use crate::servo::gain_schedule::{DEFAULT_MAX_FACTOR, DEFAULT_MIN_FACTOR, factor};
 
 /// A node that multiplies the gains of a feature by a factor, which depends on the contact.
 #[derive(Debug, Clone, Serialize)]
@@ -29,14 +29,16 @@ impl Schedule {
             return None;
         }
         let number = |key: &str, usual: f64| nodes.number(node, key).unwrap_or(usual);
-        let (min, max) = (number("min", USUAL_MIN), number("max", USUAL_MAX));
+        let (min, max) = (number("min", DEFAULT_MIN_FACTOR), number("max", DEFAULT_MAX_FACTOR));
         Some(Self { node: node.name.clone(), min, max, nominal: nominal(nodes, node, measured?) })
     }
 
     /// Returns the factor over a contact with this answer; `None` if it is not known.
     pub(super) fn factor(&self, answer: &Answer) -> Option<f64> {
         let nominal = self.nominal?;
-        Some(answer.vz.map_or(1.0, |vz| factor(vz / nominal, [self.min, self.max])))
+        // A contact that does not answer more to a larger travel has no estimate.
+        let ratio = answer.vz.map(|vz| vz / nominal).filter(|ratio| *ratio > 0.0);
+        Some(ratio.map_or(1.0, |ratio| factor(ratio, [self.min, self.max])))
     }
 }
 

@@ -8,6 +8,7 @@ mod page;
 mod save;
 mod target;
 mod trial;
+mod ways;
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -26,10 +27,11 @@ use super::control::margins::{Margins, margins};
 use super::control::response::Loop;
 use super::control::settings::{self, Index, Nodes};
 use crate::motion::COMPONENTS;
-use experiment::{Answered, Experiment, Line};
+use experiment::{Experiment, Line};
 use fit::{ENOUGH, Fit, fit};
 use target::{adder, controlled};
 use trial::Settled;
+use ways::{Response, agreed};
 
 /// Measure how the features answer the motion, and propose gains with margins
 #[derive(clap::Parser)]
@@ -139,6 +141,9 @@ struct Found {
     /// What was measured, for each component.
     #[serde(skip)]
     lines: Vec<Vec<Line>>,
+    /// How much larger the answer to the largest motion is than to the one before, if no two motions agree [1].
+    #[serde(skip_serializing_if = "Option::is_none")]
+    growth: Option<f64>,
     /// Why there is no fit.
     refused: Option<String>,
 }
@@ -280,13 +285,6 @@ fn quantity(feature: &Feature) -> String {
     feature.quantity().unwrap_or(&feature.name).to_owned()
 }
 
-/// Ways of a linear [m] and of an angular test signal [rad], one after the other.
-const WAYS: [[f64; 4]; 2] = [[0.3e-3, 1.2e-3, 2.4e-3, 4.8e-3], [0.01, 0.02, 0.04, 0.08]];
-/// Difference of two responses that agree, as the median over the frequencies [1].
-const AGREES: f64 = 0.2;
-/// A motion that is so many times as large as another one is larger [1].
-const FURTHER: f64 = 1.3;
-
 /// Part of the answer by geometry below which a contact sticks [1].
 const LEAST_SLIDE: f64 = 0.5;
 
@@ -297,12 +295,13 @@ const MAX_RESIDUAL: f64 = 0.3;
 fn identify(experiment: &Experiment<'_>, object: &str, period: f64, shell: &Shell) -> Result<Found, Stop> {
     let feature = experiment.feature;
     let components: Vec<usize> = (0..6).filter(|i| feature.column[*i] != 0.0).collect();
-    let mut found = Found { object: object.to_owned(), fits: Vec::new(), lines: Vec::new(), refused: None };
+    let mut found =
+        Found { object: object.to_owned(), fits: Vec::new(), lines: Vec::new(), growth: None, refused: None };
     for component in components {
         let experiment = Experiment { component, ..experiment.clone() };
         let known = known(feature, component, period);
         match agreed(&experiment, shell)? {
-            Ok(lines) => match fit(&lines, known) {
+            Ok(Response { lines, growth }) => match fit(&lines, known) {
                 Ok(fit) if fit.residual > MAX_RESIDUAL => {
                     found.refused = Some(format!(
                         "a gain, a resonance and a latency leave {:.0} % of the response unexplained",
@@ -318,6 +317,7 @@ fn identify(experiment: &Experiment<'_>, object: &str, period: f64, shell: &Shel
                 Ok(fit) => {
                     found.fits.push((COMPONENTS[component], fit));
                     found.lines.push(lines);
+                    found.growth = growth.or(found.growth);
                 }
                 Err(few) => {
                     found.refused = Some(format!(
@@ -346,59 +346,6 @@ fn known(feature: &Feature, component: usize, period: f64) -> impl Fn(f64) -> na
     let around = Loop::new(feature, &Answer::default(), 0.0, period).times(0.5);
     let column = feature.column[component];
     move |omega| around.known(omega) * column
-}
-
-/// Moves further and further, as far as the task stays in its mode, and returns the response to the largest motions
-/// that agree. Friction hides a small motion, and gives two of them the same wrong response: no larger motion may have
-/// a larger one.
-fn agreed(experiment: &Experiment<'_>, shell: &Shell) -> Result<Result<Vec<Line>, String>, Stop> {
-    let mut runs: Vec<Vec<Line>> = Vec::new();
-    let mut stopped = None;
-    let unit = if experiment.component < 3 { "m" } else { "rad" };
-    for way in WAYS[experiment.component / 3] {
-        shell.say_beside(&format!("`{}`: a test signal of {way} {unit}", experiment.feature.name));
-        match experiment.run(way)? {
-            Answered::Lines(lines) => runs.push(lines),
-            Answered::Nothing(reason) => {
-                stopped = Some(format!("with a test signal of {way} {unit}, {reason}"));
-                break;
-            }
-            Answered::Interrupted => return Err(Stop::Interrupted),
-        }
-    }
-    let agree = (1..runs.len()).rev().find(|i| difference(&runs[i - 1], &runs[*i]) < AGREES);
-    Ok(match agree {
-        Some(i) if !runs[i + 1..].iter().any(|later| loudness(&runs[i], later) > 1.0 + AGREES) => {
-            Ok(Line::mean(&runs[..=i]))
-        }
-        Some(_) => Err("friction holds the contact back: only the largest test signal moves it".into()),
-        None => Err(stopped.unwrap_or_else(|| {
-            format!("no two test signals gave the same response at {ENOUGH} frequencies that stand out of the noise")
-        })),
-    })
-}
-
-/// Returns the median difference of two responses, over the frequencies where the second motion was larger: 0 if none was,
-/// because the speed bounds both. Two responses that share too few frequencies are no evidence, and differ.
-fn difference(one: &[Line], other: &[Line]) -> f64 {
-    if one.iter().zip(other).filter(|(a, b)| a.counts() && b.counts()).count() < ENOUGH {
-        return f64::INFINITY;
-    }
-    let far = |a: &Line, b: &Line| (a.open - b.open).norm() / a.open.norm().max(b.open.norm());
-    further(one, other, far).unwrap_or(0.0)
-}
-
-/// Returns the second response as a multiple of the first one, over the same frequencies.
-fn loudness(one: &[Line], other: &[Line]) -> f64 {
-    further(one, other, |a, b| b.open.norm() / a.open.norm()).unwrap_or(1.0)
-}
-
-/// Returns the median of a number of two responses, over the frequencies where the second motion was larger.
-fn further(one: &[Line], other: &[Line], of: impl Fn(&Line, &Line) -> f64) -> Option<f64> {
-    let larger = one.iter().zip(other).filter(|(a, b)| b.way >= FURTHER * a.way && a.counts() && b.counts());
-    let mut found: Vec<f64> = larger.map(|(a, b)| of(a, b)).collect();
-    found.sort_by(f64::total_cmp);
-    found.get(found.len() / 2).copied()
 }
 
 /// Returns the answer of a feature to all components. The resonance and the latency are those of the first one.

@@ -1,0 +1,88 @@
+//! Test signals of growing ways, until two of them say the same.
+
+use tactflow_runtime::cli::Shell;
+
+use super::Stop;
+use super::experiment::{Answered, Experiment, Line};
+use super::fit::ENOUGH;
+
+/// Ways of a linear [m] and of an angular test signal [rad], one after the other.
+const WAYS: [[f64; 4]; 2] = [[0.3e-3, 1.2e-3, 2.4e-3, 4.8e-3], [0.01, 0.02, 0.04, 0.08]];
+/// Difference of two responses that agree, as the median over the frequencies [1].
+const AGREES: f64 = 0.2;
+/// A motion that is so many times as large as another one is larger [1].
+const FURTHER: f64 = 1.3;
+/// Growth of the response from one way to the next with which the larger one counts [1].
+const MAX_GROWTH: f64 = 0.5;
+
+/// What the motions of all ways say.
+pub(super) struct Response {
+    pub(super) lines: Vec<Line>,
+    /// How much larger the last response is than the one before, if no two of them agree [1].
+    pub(super) growth: Option<f64>,
+}
+
+/// Moves further and further, as far as the task stays in its mode, and returns the response to the largest motions
+/// that agree. Friction hides a small motion, and gives two of them the same wrong response: no larger motion may have
+/// a larger one. If the response only grows a little to the end, the last one counts, which has the smallest margins.
+pub(super) fn agreed(experiment: &Experiment<'_>, shell: &Shell) -> Result<Result<Response, String>, Stop> {
+    let mut runs: Vec<Vec<Line>> = Vec::new();
+    let mut stopped = None;
+    let unit = if experiment.component < 3 { "m" } else { "rad" };
+    for way in WAYS[experiment.component / 3] {
+        shell.say_beside(&format!("`{}`: a test signal of {way} {unit}", experiment.feature.name));
+        match experiment.run(way)? {
+            Answered::Lines(lines) => runs.push(lines),
+            Answered::Nothing(reason) => {
+                stopped = Some(format!("with a test signal of {way} {unit}, {reason}"));
+                break;
+            }
+            Answered::Interrupted => return Err(Stop::Interrupted),
+        }
+    }
+    let agree = (1..runs.len()).rev().find(|i| difference(&runs[i - 1], &runs[*i]) < AGREES);
+    let is_loudest = |i: usize| !runs[i + 1..].iter().any(|later| loudness(&runs[i], later) > 1.0 + AGREES);
+    if let Some(i) = agree.filter(|i| is_loudest(*i)) {
+        return Ok(Ok(Response { lines: Line::mean(&runs[..=i]), growth: None }));
+    }
+    if let [.., before, last] = &runs[..] {
+        let growth = loudness(before, last);
+        if growth > 1.0 && growth <= 1.0 + MAX_GROWTH && shared(before, last) >= ENOUGH {
+            return Ok(Ok(Response { lines: last.clone(), growth: Some(growth) }));
+        }
+    }
+    Ok(Err(match agree {
+        Some(_) => "friction holds the contact back: only the largest test signal moves it".into(),
+        None => stopped.unwrap_or_else(|| {
+            format!("no two test signals gave the same response at {ENOUGH} frequencies that stand out of the noise")
+        }),
+    }))
+}
+
+/// Returns the median difference of two responses, over the frequencies where the second motion was larger: 0 if none was,
+/// because the speed bounds both. Two responses that share too few frequencies are no evidence, and differ.
+fn difference(one: &[Line], other: &[Line]) -> f64 {
+    if shared(one, other) < ENOUGH {
+        return f64::INFINITY;
+    }
+    let far = |a: &Line, b: &Line| (a.open - b.open).norm() / a.open.norm().max(b.open.norm());
+    further(one, other, far).unwrap_or(0.0)
+}
+
+/// Returns the number of frequencies that stand out of the noise in two responses.
+fn shared(one: &[Line], other: &[Line]) -> usize {
+    one.iter().zip(other).filter(|(a, b)| a.counts() && b.counts()).count()
+}
+
+/// Returns the second response as a multiple of the first one, over the same frequencies.
+fn loudness(one: &[Line], other: &[Line]) -> f64 {
+    further(one, other, |a, b| b.open.norm() / a.open.norm()).unwrap_or(1.0)
+}
+
+/// Returns the median of a number of two responses, over the frequencies where the second motion was larger.
+fn further(one: &[Line], other: &[Line], of: impl Fn(&Line, &Line) -> f64) -> Option<f64> {
+    let larger = one.iter().zip(other).filter(|(a, b)| b.way >= FURTHER * a.way && a.counts() && b.counts());
+    let mut found: Vec<f64> = larger.map(|(a, b)| of(a, b)).collect();
+    found.sort_by(f64::total_cmp);
+    found.get(found.len() / 2).copied()
+}
