@@ -38,21 +38,16 @@ pub struct GainSchedule {
     max: f64,
 }
 
-/// Smallest factor without `min` [1].
-pub(crate) const DEFAULT_MIN_FACTOR: f64 = 0.2;
-/// Largest factor without `max` [1].
-pub(crate) const DEFAULT_MAX_FACTOR: f64 = 1.0;
-
 /// Parameters of `gain_schedule`.
 #[derive(Debug, Clone, Param)]
 pub struct Params {
     /// Features whose control is divided.
     features: Vec<Spanned<String>>,
     /// Smallest factor.
-    #[param(unit = "1", range = 0.0..=1.0, default = DEFAULT_MIN_FACTOR)]
+    #[param(unit = "1", range = 0.0..=1.0, default = 0.2)]
     min: f64,
     /// Largest factor.
-    #[param(unit = "1", range = 1.0..=100.0, default = DEFAULT_MAX_FACTOR)]
+    #[param(unit = "1", range = 1.0..=100.0, default = 1.0)]
     max: f64,
 }
 
@@ -118,7 +113,7 @@ impl Node for GainSchedule {
 }
 
 /// Returns the inverse of a ratio within two bounds; the larger one for a ratio that is not a positive number.
-pub(crate) fn factor(ratio: f64, [min, max]: [f64; 2]) -> f64 {
+fn factor(ratio: f64, [min, max]: [f64; 2]) -> f64 {
     if ratio > 0.0 { (1.0 / ratio).clamp(min, max) } else { max }
 }
 

@@ -6,7 +6,9 @@ use tactflow_runtime::graph::OutlinedBlock;
 use super::contacts::Answer;
 use super::filters::filters;
 use super::settings::{Nodes, source};
-use crate::servo::gain_schedule::{DEFAULT_MAX_FACTOR, DEFAULT_MIN_FACTOR, factor};
+
+/// Smallest and largest factor of a `gain_schedule` that states none [1].
+const DEFAULT_FACTORS: [f64; 2] = [0.2, 1.0];
 
 /// A node that multiplies the gains of a feature by a factor, which depends on the contact.
 #[derive(Debug, Clone, Serialize)]
@@ -29,7 +31,7 @@ impl Schedule {
             return None;
         }
         let number = |key: &str, usual: f64| nodes.number(node, key).unwrap_or(usual);
-        let (min, max) = (number("min", DEFAULT_MIN_FACTOR), number("max", DEFAULT_MAX_FACTOR));
+        let [min, max] = [number("min", DEFAULT_FACTORS[0]), number("max", DEFAULT_FACTORS[1])];
         Some(Self { node: node.name.clone(), min, max, nominal: nominal(nodes, node, measured?) })
     }
 
@@ -38,7 +40,7 @@ impl Schedule {
         let nominal = self.nominal?;
         // A contact that does not answer more to a larger travel has no estimate.
         let ratio = answer.vz.map(|vz| vz / nominal).filter(|ratio| *ratio > 0.0);
-        Some(ratio.map_or(1.0, |ratio| factor(ratio, [self.min, self.max])))
+        Some(ratio.map_or(1.0, |ratio| (1.0 / ratio).clamp(self.min, self.max)))
     }
 }
 
