@@ -7,6 +7,9 @@ const FIRST_TOUCH_NS: i64 = 500_000_000;
 /// A contact that comes back within this time goes on: it is no first touch [ns].
 const SAME_CONTACT_NS: i64 = 100_000_000;
 
+/// Time after a loss in which a touch begins the rest anew [ns].
+const MAX_REST_NS: i64 = 3_000_000_000;
+
 /// What a motion may do.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Phase {
@@ -42,8 +45,8 @@ pub struct Course {
     touched_since: Option<i64>,
     /// When that contact was first missing, if it has not come back.
     missing_since: Option<i64>,
-    /// Since when nothing has touched the pad, not even for a frame, if that contact is missing. A touch does not
-    /// restart it once the search has begun.
+    /// Since when nothing has touched the pad, not even for a frame, if that contact is missing. A touch begins it
+    /// anew for some time only.
     untouched_since: Option<i64>,
     /// Whether the arm has begun to search for that contact.
     searches: bool,
@@ -69,8 +72,8 @@ impl Course {
             self.untouched_since.get_or_insert(now);
         }
         let Some(missing) = self.missing_since else { return Phase::Touched };
-        // A touch that flickers where the arm has searched to must not let it rest there for ever.
-        if touches && !self.searches {
+        // A touch that flickers must not let the arm rest for ever.
+        if touches && now - missing <= MAX_REST_NS {
             self.untouched_since = Some(now);
         }
         let (gap, is_bounce) = (now - missing, missing - touched < FIRST_TOUCH_NS);

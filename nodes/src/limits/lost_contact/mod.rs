@@ -25,9 +25,9 @@ pub use lead::lead;
 /// 1. The arm gives back its lead, the way by which a compliant arm has pressed ahead of its position. It moves out along
 ///    -z at `retreat_m_per_s`, so that the spring does not push the sensor to where the object was. A stiff arm has no lead.
 /// 2. It rests until `wait_ms` after the first tick without the contact, or after the last tick in which anything touched
-///    the pad since.
+///    the pad since. From 3 s after the loss on, a touch that flickers no longer begins the rest anew.
 /// 3. It searches: a motion with a part into the object is slowed down as a whole, until no corner of the pad is faster
-///    than `search_m_per_s`. A touch that flickers does not end the search.
+///    than `search_m_per_s`.
 ///
 /// The wanted motion out of the object always passes. Once a contact has lasted for 40 ms again, everything does. Just
 /// after a first touch the pad may bounce: a contact that is lost within half a second is searched at once, without a retreat

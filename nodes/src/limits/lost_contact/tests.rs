@@ -142,14 +142,19 @@ fn a_touch_for_a_moment_begins_the_rest_anew() {
 }
 
 #[test]
-fn a_touch_that_flickers_does_not_end_the_search() {
+fn a_touch_that_flickers_does_not_let_the_arm_rest_for_ever() {
     let mut cell = Cell::new();
     cell.run(2000.0, true, 0.0);
-    cell.run(800.0, false, 0.0);
-    for _ in 0..10 {
-        let flicker = [cell.run(20.0, true, 0.0), cell.run(60.0, false, 0.0)].concat();
-        assert!(flicker.iter().all(is_into_the_object), "{flicker:?}");
-    }
+    let mut flicker = |ms: f64| {
+        let steps = (0..(ms / 80.0) as u32)
+            .flat_map(|_| [cell.run(60.0, false, 0.0), cell.run(20.0, true, 0.0)].concat())
+            .collect::<Vec<_>>();
+        steps.iter().filter(|twist| is_into_the_object(twist)).count() * 4
+    };
+    // For 3 s a hand may be there; then the arm rests once more, and searches.
+    assert_eq!(flicker(2960.0), 0);
+    assert!((160..=480).contains(&flicker(960.0)), "the search begins 0.6 s later");
+    assert_eq!(flicker(800.0), 800);
 }
 
 #[test]
