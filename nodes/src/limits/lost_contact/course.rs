@@ -6,7 +6,6 @@ const MIN_CONTACT_NS: i64 = 40_000_000;
 const FIRST_TOUCH_NS: i64 = 500_000_000;
 /// A contact that comes back within this time goes on: it is no first touch [ns].
 const SAME_CONTACT_NS: i64 = 100_000_000;
-
 /// Time after a loss in which a touch begins the rest anew [ns].
 const MAX_REST_NS: i64 = 3_000_000_000;
 
@@ -45,8 +44,8 @@ pub struct Course {
     touched_since: Option<i64>,
     /// When that contact was first missing, if it has not come back.
     missing_since: Option<i64>,
-    /// Since when nothing has touched the pad, not even for a frame, if that contact is missing. A touch begins it
-    /// anew for some time only.
+    /// Since when nothing has touched the pad, not even for a frame, if that contact is missing. After
+    /// `MAX_REST_NS`, a touch no longer changes it.
     untouched_since: Option<i64>,
     /// Whether the arm has begun to search for that contact.
     searches: bool,
