@@ -59,7 +59,7 @@ pub(crate) fn inputs(input: &DeriveInput) -> TokenStream {
                 #shapes_name { #(#shapes_of),* }
             }
 
-            #[inline]
+            #[inline(always)]
             fn fetch(
                 bus: &#lifetime ::tactflow_runtime::node::Bus,
                 wires: &#lifetime ::tactflow_runtime::node::Wires,
@@ -110,7 +110,7 @@ pub(crate) fn outputs(input: &DeriveInput) -> TokenStream {
                 ::std::vec![#(::core::convert::Into::into(shapes.#names)),*]
             }
 
-            #[inline]
+            #[inline(always)]
             fn take(
                 bus: &mut ::tactflow_runtime::node::Bus,
                 ports: &[::tactflow_runtime::node::PortId],
@@ -119,7 +119,7 @@ pub(crate) fn outputs(input: &DeriveInput) -> TokenStream {
                 Self { #(#taken),* }
             }
 
-            #[inline]
+            #[inline(always)]
             fn put(
                 self,
                 bus: &mut ::tactflow_runtime::node::Bus,
