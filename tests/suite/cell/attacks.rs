@@ -260,17 +260,26 @@ impl Run {
         let Figures { summary, commands, motion, .. } = self.cell.end();
         for rest in &rests {
             let is_in = |row: &&Vec<f64>| (rest.from..=rest.to).contains(&row[0]);
-            let moves = motion.iter().filter(is_in).find(|row| row[1] > STILL);
-            assert!(moves.is_none(), "{pair:?}, {rest}: it moves: {moves:?}\n{err}");
+            if let Some(row) = motion.iter().filter(is_in).find(|row| row[1] > STILL) {
+                let [motion, commands] = [&motion, &commands].map(|rows| around(row[0], rows));
+                panic!("{pair:?}, {rest}: it moves:\n{motion}the commands:\n{commands}{err}");
+            }
             let is_motion = |row: &&Vec<f64>| row[2] == 1.0 && row[3..].iter().any(|v| v.abs() > STILL);
-            let command = commands.iter().filter(is_in).find(is_motion);
-            assert!(command.is_none(), "{pair:?}, {rest}: it is commanded: {command:?}\n{err}");
+            if let Some(row) = commands.iter().filter(is_in).find(is_motion) {
+                panic!("{pair:?}, {rest}: it is commanded:\n{}{err}", around(row[0], &commands));
+            }
         }
         let fastest = motion.iter().map(|row| row[1]).fold(0.0, f64::max);
         assert!(fastest < FASTEST, "{pair:?}: {fastest} rad/s");
         assert_eq!(summary["arm"]["faults"], 0, "{pair:?}: {summary}");
         rests.len()
     }
+}
+
+/// The rows within 50 ms of a time.
+fn around(time: f64, rows: &[Vec<f64>]) -> String {
+    let near = rows.iter().filter(|row| (row[0] - time).abs() < 0.05);
+    near.map(|row| format!("  {row:?}\n")).collect()
 }
 
 /// Attacks a run with all of these, one after the other, each at a random moment of a motion.
