@@ -57,9 +57,9 @@ fn two_arms() -> Request {
 fn an_arm_that_finds_nothing_stops_within_its_bound_and_the_other_one_goes_on() {
     let mut engine = engine(&two_arms());
     let poses = ["left_move.state.sensor_pose", "right_move.state.sensor_pose"];
-    let [left, right] = ways(&mut engine, 7.0, poses);
+    let [left, right] = ways(&mut engine, 9.0, poses);
     assert!((0.048..=0.0501).contains(&right.whole_m), "the right arm moved {:.4} m of 0.05 m", right.whole_m);
-    // At 15 mm/s the budget is spent after some 3.4 s. After that, the task still asks the arm to move.
+    // At 8 mm/s the budget is spent after some 6.5 s. After that, the task still asks the arm to move.
     let last = right.last_second_m();
     assert!(last < 1e-4, "the right arm moved {last:.6} m in the last second");
     assert!(engine.get::<Twist>("right_reach.twist").is_some_and(|twist| twist.0[2] > 0.0), "its task still wants to");
@@ -116,7 +116,7 @@ fn without_an_object_every_approach_stops_within_its_bound() {
             .set("devices.bench.objects=[]")
             .set("modes.approach.fail={ after_ms = 9000 }")
             .set("limits.blind_mm=40.0");
-        let [way] = ways(&mut engine(&request), 6.0, ["move.state.sensor_pose"]);
+        let [way] = ways(&mut engine(&request), 7.0, ["move.state.sensor_pose"]);
         assert!((0.038..=0.0401).contains(&way.whole_m), "{task}: the arm moved {:.4} m of 0.04 m", way.whole_m);
         assert!(way.last_second_m() < 1e-4, "{task}: the arm moved {:.6} m at last", way.last_second_m());
     }

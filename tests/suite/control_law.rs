@@ -90,7 +90,7 @@ fn what_a_mode_sets_counts() {
         modes.iter().find(|mode| mode["mode"] == name).unwrap().clone()
     });
     assert_eq!(approach["features"][0]["column"], serde_json::json!([0.0, 0.0, 0.0, 0.0, 0.0, 0.0]));
-    assert_eq!(approach["constants"][0]["twist"][2], 0.015);
+    assert_eq!(approach["constants"][0]["twist"][2], 0.008);
     assert_eq!((&servo["features"][0]["kp"], servo["constants"].as_array().unwrap().len()), (&3.0.into(), 0));
     let pressure = servo["features"].as_array().unwrap().iter().find(|one| one["name"] == "pressure").unwrap();
     // A low-pass of 50 ms, and half of nine periods of 4 ms.

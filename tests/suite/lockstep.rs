@@ -86,7 +86,7 @@ fn every_servo_task_runs_on_it_with_no_other_change() {
         ("rolling", "--scene ball --offset 0.01 0 --seconds 1.5", 375.0),
         ("edge", "--scene edge --gap 0.002 --seconds 1", 250.0),
         ("cable", "--scene cable --radius 0.006 --angle 1.57 --gap 0.002 --seconds 1", 250.0),
-        ("explore", "--scene plane --seconds 1", 250.0),
+        ("explore", "--scene plane --seconds 1.5", 375.0),
     ];
     for (graph, simulator, frames) in cases {
         let (said, seen) = run(graph, simulator, &[]);
@@ -124,14 +124,14 @@ const ON_THE_GANTRY: [(&str, &str, f64, Promise); 9] = [
     ("position", "--scene ball --offset 0.006 -0.004", 2.4, CENTRED),
     ("hybrid", "--scene ball --offset 0.006 -0.004", 3.2, CENTRED),
     ("rolling", "--scene ball --radius 0.05 --offset 0.006 -0.004", 3.2, CENTRED),
-    ("edge", "--scene edge --angle 1.2", 3.2, ([ANYWHERE; 2], 0.06, 0.0)),
+    ("edge", "--scene edge --angle 1.2", 4.0, ([ANYWHERE; 2], 0.06, 0.0)),
     ("cable", "--scene rod --radius 0.004 --angle 1.3 --offset 0.003 0", 4.0, ([1e-3, ANYWHERE], 0.03, 0.015)),
-    ("explore", "--scene plane", 4.0, CENTRED),
-    ("square", "--scene plane", 4.0, ([ANYWHERE; 2], ANYWHERE, 0.002)),
+    ("explore", "--scene plane", 4.8, CENTRED),
+    ("square", "--scene plane", 4.8, ([ANYWHERE; 2], ANYWHERE, 0.002)),
     (
         "seek_ridge",
         "--scene ridge --radius 0.005 --length 0.06 --angle 1 --offset 0.005 0",
-        7.2,
+        8.0,
         ([1e-3, 0.02], 0.03, 0.02),
     ),
 ];

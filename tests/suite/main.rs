@@ -28,6 +28,7 @@ mod doctor;
 #[cfg(target_os = "linux")]
 mod doctor_press;
 mod draw;
+mod engine;
 mod erased;
 mod errors;
 mod examples;

@@ -230,7 +230,7 @@ fn good() -> Vec<Variant> {
             all.push(Variant { task: "hybrid", bench: Some(bench), changes: scaled("hybrid", factor) });
         }
     }
-    for speed in ["0.005", "0.015"] {
+    for speed in ["0.005", "0.008"] {
         all.push(Variant { task: "edge", bench: None, changes: search(speed) });
     }
     all.extend([

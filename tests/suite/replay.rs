@@ -151,7 +151,7 @@ fn a_replay_that_differs_names_the_tick_the_port_and_the_component_and_ends_with
     let csv = folder.path().join("run.csv");
     let path = recorded(folder.path(), &["graphs/hybrid.toml", "--for", "3s", "--out", csv.to_str().unwrap()]);
     let first = first_number(&csv, "pid.control.y");
-    let said = replay(&edited(&path, "gains.y = { kp = 4.0 }", "gains.y = { kp = 4.1 }"), &["-q"]);
+    let said = replay(&edited(&path, "gains.y = { kp = 4.5 }", "gains.y = { kp = 4.1 }"), &["-q"]);
     assert_eq!((said.code, said.out.as_str()), (1, ""));
     let place = format!(" from tick {first} at ");
     assert!(said.err.contains(&place) && said.err.contains("`pid.control` differs"), "{}", said.err);
@@ -179,10 +179,10 @@ fn a_part_of_a_replay_is_that_part_of_the_run() {
 #[test]
 fn another_graph_runs_on_the_recorded_inputs() {
     let folder = tempfile::tempdir().unwrap();
-    let path = recorded(folder.path(), &["graphs/hybrid.toml", "--for", "1s"]);
+    let path = recorded(folder.path(), &["graphs/hybrid.toml", "--for", "1.3s"]);
     let same = replay(&path, &["-q", "--graph", "graphs/hybrid.toml"]);
     assert_eq!((same.code, same.err.as_str()), (0, ""));
-    assert!(same.out.contains("251 ticks") && same.out.ends_with("the same to the last bit\n"), "{}", same.out);
+    assert!(same.out.contains("326 ticks") && same.out.ends_with("the same to the last bit\n"), "{}", same.out);
     let other = replay(&path, &["-q", "--graph", "graphs/position.toml"]);
     assert_eq!((other.code, other.err.as_str()), (0, ""), "{}", other.out);
     assert!(

@@ -24,18 +24,18 @@ const SMALL_PAD: &str = "rows = 8\ncols = 8\npitch = 0.003\nrate_hz = 100\n";
 /// The shipped tasks: the modes on the way to the work, a time by which each is there [s], and the place of the pressure
 /// among the errors of a task that controls it in newtons.
 const TASKS: [(&str, &[&str], f64, Option<usize>); 12] = [
-    ("cable", &["approach", "servo"], 2.0, Some(2)),
-    ("edge", &["approach", "servo"], 2.0, Some(0)),
-    ("explore", &["approach", "align", "scan"], 3.0, Some(2)),
+    ("cable", &["approach", "servo"], 2.6, Some(2)),
+    ("edge", &["approach", "servo"], 3.2, Some(0)),
+    ("explore", &["approach", "align", "scan"], 4.0, Some(2)),
     ("finger_press", &["none"], 2.0, None),
-    ("force", &["approach", "servo"], 2.0, Some(0)),
-    ("guided", &["approach", "press", "guided"], 4.5, Some(0)),
-    ("hold_without_slip", &["approach", "servo"], 2.0, None),
-    ("hybrid", &["approach", "servo"], 2.0, Some(2)),
-    ("position", &["approach", "servo"], 2.0, None),
-    ("rolling", &["approach", "servo"], 2.0, Some(2)),
-    ("seek_ridge", &["approach", "press", "turn", "follow"], 3.0, Some(2)),
-    ("square", &["approach", "press", "trace"], 4.5, Some(0)),
+    ("force", &["approach", "servo"], 2.6, Some(0)),
+    ("guided", &["approach", "press", "guided"], 5.2, Some(0)),
+    ("hold_without_slip", &["approach", "servo"], 2.6, None),
+    ("hybrid", &["approach", "servo"], 2.6, Some(2)),
+    ("position", &["approach", "press", "servo"], 2.6, None),
+    ("rolling", &["approach", "servo"], 2.6, Some(2)),
+    ("seek_ridge", &["approach", "press", "turn", "follow"], 3.8, Some(2)),
+    ("square", &["approach", "press", "trace"], 5.4, Some(0)),
 ];
 
 /// The bench that a shipped task names.

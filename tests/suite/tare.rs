@@ -82,7 +82,7 @@ fn a_graph_without_a_zero_says_so() {
 
 #[test]
 fn a_light_touch_is_not_taken_as_a_zero() {
-    let words = ["--send", "0.76s:stop", "--send", "1.5s:tare", "--for", "2.4s", "--send", "2.3s:resume", "--quiet"];
+    let words = ["--send", "1.1s:stop", "--send", "1.5s:tare", "--for", "2.4s", "--send", "2.3s:resume", "--quiet"];
     let run = say(&[&["run", "graphs/hybrid.toml"], &words[..]].concat());
     assert!(
         run.code == 0 && run.err.contains("`tare` has no effect: `touch.calibrate`: something touches"),

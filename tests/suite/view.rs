@@ -175,14 +175,14 @@ fn while_it_runs_a_terminal_sees_the_image_and_a_pipe_nothing() {
 
 #[test]
 fn while_it_runs_a_terminal_sees_the_mode_the_limits_and_what_holds_the_commands() {
-    let seen = on_a_terminal(100, &["run", HYBRID, "--realtime", "--for", "2s"]);
-    for text in ["mode approach for 0.", "mode servo for 0.", "limited by move.contact.force to "] {
+    let seen = on_a_terminal(100, &["run", HYBRID, "--realtime", "--for", "2.4s"]);
+    for text in ["mode approach for 0.", "mode servo for 0.", "limited by move."] {
         assert!(seen.contains(text), "{text}: {seen}");
     }
     assert!(!seen.contains("commands held"), "{seen}");
     let halted = said_to_a_terminal(
         100,
-        &["run", HYBRID, "--realtime", "--send", "0.9s:stop", "--send", "1.7s:resume", "--for", "2s"],
+        &["run", HYBRID, "--realtime", "--send", "1.3s:stop", "--send", "2.1s:resume", "--for", "2.4s"],
     )
     .out;
     assert!(halted.contains("commands stopped until `resume`: "), "{halted}");
@@ -218,17 +218,17 @@ fn a_run_in_virtual_time_pauses_and_goes_on_at_a_word() {
     let mut command = crate::tool::tool(&args);
     command.stdin(std::process::Stdio::piped()).stdout(std::process::Stdio::piped());
     let mut run = command.spawn().unwrap();
-    run.stdin.take().unwrap().write_all(b"\n\n200ms\nwhat\nq\n").unwrap();
+    run.stdin.take().unwrap().write_all(b"\n\n400ms\nwhat\nq\n").unwrap();
     let out = String::from_utf8(run.wait_with_output().unwrap().stdout).unwrap();
     let pauses: Vec<&str> = out.lines().filter(|line| line.contains(" s, tick ")).collect();
     let times: Vec<&str> = pauses.iter().map(|line| line.split(' ').next().unwrap()).collect();
-    assert_eq!(times, ["0.000", "0.500", "1.000", "1.200", "1.200"], "{out}");
+    assert_eq!(times, ["0.000", "0.500", "1.000", "1.400", "1.400"], "{out}");
     assert!(
         pauses[0].contains("Enter or n: on to the next pause") && pauses[4].contains("`what` is no word here"),
         "{out}"
     );
-    assert!(out.contains("mode servo for 0.2 s") && out.contains("limited by"), "{out}");
-    assert!(out.contains("interrupted after 1.200 s and 301 ticks"), "{out}");
+    assert!(out.contains("mode servo for 0.3 s") && out.contains("limited by"), "{out}");
+    assert!(out.contains("interrupted after 1.400 s and 351 ticks"), "{out}");
     let refused = crate::tool::say(&["run", "graphs/hybrid.toml", "--step", "--realtime"]);
     assert!(refused.code == 2 && refused.err.contains("`--step` requires virtual time"), "{}", refused.err);
 }

@@ -6,9 +6,9 @@ use std::net::{Shutdown, SocketAddr, TcpListener, TcpStream, UdpSocket};
 use std::os::fd::OwnedFd;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU8, Ordering};
-use std::sync::{Arc, OnceLock, Weak};
+use std::sync::{Arc, Mutex, OnceLock, Weak};
 use std::thread;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use nix::fcntl::{FcntlArg, OFlag, fcntl};
 use nix::pty::openpty;
@@ -22,44 +22,70 @@ const CUT: u8 = 2;
 const IDLE: Duration = Duration::from_millis(1);
 /// Time after which a relay without datagrams looks whether its cable is still there.
 const LOOK: Duration = Duration::from_millis(50);
+/// Time after which there is no packet to cut.
+const SILENCE: Duration = Duration::from_secs(1);
 
 /// What the wires of a cable do. Its relays end with it.
 #[derive(Default)]
-pub(super) struct Cable(Arc<AtomicU8>);
+pub(super) struct Cable {
+    does: Arc<AtomicU8>,
+    /// Locked while bytes pass.
+    passing: Arc<Mutex<()>>,
+}
 
 impl Cable {
-    /// Lets all bytes pass, or swallows them.
+    /// Lets all bytes pass, or swallows them from its return on.
     pub(super) fn swallow(&self, swallows: bool) {
-        self.0.store(if swallows { SWALLOW } else { PASS }, Ordering::SeqCst);
+        self.does.store(if swallows { SWALLOW } else { PASS }, Ordering::SeqCst);
+        self.wait_for_what_passes();
     }
 
     /// Cuts the next packet in its middle, and swallows the rest. A connection ends there, and there is no other one.
+    /// Returns after the cut, which a busy machine may delay.
     pub(super) fn cut(&self) {
-        self.0.store(CUT, Ordering::SeqCst);
+        self.does.store(CUT, Ordering::SeqCst);
+        let end = Instant::now() + SILENCE;
+        while self.does.load(Ordering::SeqCst) == CUT && Instant::now() < end {
+            thread::sleep(IDLE);
+        }
+        self.wait_for_what_passes();
+    }
+
+    fn wait_for_what_passes(&self) {
+        drop(self.passing.lock());
     }
 
     fn wire(&self) -> Wire {
-        Wire(Arc::downgrade(&self.0))
+        Wire { does: Arc::downgrade(&self.does), passing: Arc::clone(&self.passing) }
     }
 }
 
 /// A wire of a cable.
 #[derive(Clone)]
-struct Wire(Weak<AtomicU8>);
+struct Wire {
+    does: Weak<AtomicU8>,
+    passing: Arc<Mutex<()>>,
+}
 
 impl Wire {
     fn is_there(&self) -> bool {
-        self.0.strong_count() > 0
+        self.does.strong_count() > 0
     }
 
     fn has_state(&self, state: u8) -> bool {
-        self.0.upgrade().is_some_and(|found| found.load(Ordering::SeqCst) == state)
+        self.does.upgrade().is_some_and(|does| does.load(Ordering::SeqCst) == state)
+    }
+
+    /// Does what passes bytes on; the cable waits for its end.
+    fn pass<T>(&self, passes: impl FnOnce() -> T) -> T {
+        let _passing = self.passing.lock();
+        passes()
     }
 
     /// Returns how many of so many bytes pass, and whether the cable is cut behind them.
     fn passes(&self, count: usize) -> (usize, bool) {
-        let cuts = |state: &AtomicU8| state.compare_exchange(CUT, SWALLOW, Ordering::SeqCst, Ordering::SeqCst).is_ok();
-        let is_cut = self.0.upgrade().is_none_or(|state| cuts(&state));
+        let cuts = |does: &AtomicU8| does.compare_exchange(CUT, SWALLOW, Ordering::SeqCst, Ordering::SeqCst).is_ok();
+        let is_cut = self.does.upgrade().is_none_or(|does| cuts(&does));
         match is_cut {
             true => (count / 2, true),
             false => (if self.has_state(PASS) { count } else { 0 }, false),
@@ -98,8 +124,11 @@ pub(super) fn tcp(to: u16, cable: &Cable) -> u16 {
 fn follow(mut from: TcpStream, mut to: TcpStream, wire: &Wire) {
     let mut bytes = [0; 4096];
     while let Ok(count @ 1..) = from.read(&mut bytes) {
-        let (count, is_cut) = wire.passes(count);
-        if to.write_all(&bytes[..count]).is_err() || is_cut {
+        let goes_on = wire.pass(|| {
+            let (count, is_cut) = wire.passes(count);
+            to.write_all(&bytes[..count]).is_ok() && !is_cut
+        });
+        if !goes_on {
             break;
         }
     }
@@ -135,11 +164,13 @@ fn pass_datagrams(
         while wire.is_there() {
             let Ok((count, sender)) = from.recv_from(&mut bytes) else { continue };
             origin.as_ref().map(|origin| origin.set(sender));
-            let (count, _) = wire.passes(count);
-            if let (Some(to), 1..) = (to.get(), count) {
-                // Nobody may listen yet, or any more.
-                let _ = by.send_to(&bytes[..count], to);
-            }
+            wire.pass(|| {
+                let (count, _) = wire.passes(count);
+                if let (Some(to), 1..) = (to.get(), count) {
+                    // Nobody may listen yet, or any more.
+                    let _ = by.send_to(&bytes[..count], to);
+                }
+            });
         }
     });
 }
@@ -161,7 +192,8 @@ pub(super) fn terminal(of: &Path, cable: &Cable) -> (PathBuf, OwnedFd) {
     thread::spawn(move || {
         let (mut device, mut host) = (device, host);
         while wire.is_there() {
-            let passed = move_bytes(&mut device, &mut host, &wire) + move_bytes(&mut host, &mut device, &wire);
+            let passed =
+                wire.pass(|| move_bytes(&mut device, &mut host, &wire) + move_bytes(&mut host, &mut device, &wire));
             if passed == 0 {
                 thread::sleep(IDLE);
             }

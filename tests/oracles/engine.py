@@ -1,0 +1,259 @@
+"""A simulator for the lockstep bridge whose arm is computed by a physics engine: MuJoCo (`pip install mujoco`).
+
+MuJoCo integrates a KUKA LWR 4+ with the masses of its model, the inertia of its drives, friction in its joints, and
+joint impedance. The pad is a foam of 48 by 48 points that stiffens, creeps, and sticks to the object until it slips:
+each point has a bristle. The objects do not move. It listens, prints its port, serves one graph and prints what it saw.
+
+    python3 engine.py --scene box --offset 0.01 -0.005 --angle 0.4 --seconds 10 --port 7777
+"""
+
+import argparse
+import json
+import math
+import socket
+import sys
+from pathlib import Path
+
+import mujoco
+import numpy as np
+
+DT, SUBSTEPS = 0.004, 4
+CELLS, PITCH, FINE = 16, 0.005, 3
+NEWTON, COUNTS, THRESHOLD = 0.1, 102.375, 0.15
+START = [0.0, 0.5, 0.0, -1.3, 0.0, 1.3, 0.0]
+SENSOR = 0.03
+NAMES = [f"lwr_{name}_joint" for name in ("a1", "a2", "e1", "a3", "a4", "a5", "a6")]
+Q_MAX = [math.radians(degrees) for degrees in (170, 120, 170, 120, 170, 120, 170)]
+DQ_MAX = [math.radians(degrees) for degrees in (110, 110, 128, 128, 204, 184, 184)]
+MODEL = Path(__file__).parents[2] / "graphs/robots/lwr4p.urdf"
+# What the torque control leaves of the inertia of the drives [kg m²], and the friction of the joints [N m].
+DRIVES = [0.96, 0.92, 0.6, 0.62, 0.24, 0.12, 0.12]
+JOINT_FRICTION = 0.1
+STIFFNESS, DAMPING_RATIO = 200.0, 0.2
+# The foam of a tactel [N/m, N/m³], where it stiffens [m], its creep, and the spread of a force over the tactels [m].
+FOAM, CUBIC, SOFT, CREEP, CREEP_S, SPREAD = 300.0, 8e7, 0.0025, 0.05, 1.5, 0.003
+FRICTION, BRISTLES = 0.35, 0.6
+# Noise of a frame that all tactels share, of each tactel [units], and the errors of their gains.
+COMMON, OWN, GAINS = 0.04, 0.03, 0.05
+
+
+class Scene:
+    """An object in the axes of the sensor at the start: how deep points are in it [m]."""
+
+    def __init__(self, args):
+        (self.x, self.y), self.gap, self.radius, self.kind = args.offset, args.gap, args.radius, args.scene
+        self.half = np.array([*args.size, 0.04]) / 2
+        self.sin, self.cos = math.sin(args.angle), math.cos(args.angle)
+
+    def depth(self, points):
+        x, y, z = points[0] - self.x, points[1] - self.y, points[2] - self.gap
+        along, across = x * self.cos + y * self.sin, y * self.cos - x * self.sin
+        if self.kind == "ball":
+            return self.radius - np.sqrt(x * x + y * y + (z - self.radius) ** 2)
+        if self.kind == "pen":
+            beyond = np.maximum(0.0, np.abs(along) - self.half[0])
+            return self.radius - np.sqrt(beyond**2 + across**2 + (z - self.radius) ** 2)
+        if self.kind == "edge":
+            return np.minimum(z, across)
+        # A box with edges of 2 mm.
+        place = np.abs([along, across, z - self.half[2]]) - (self.half[:, None] - 0.002)
+        outside = np.sqrt((np.maximum(place, 0.0) ** 2).sum(axis=0))
+        return 0.002 - outside - np.minimum(place.max(axis=0), 0.0)
+
+
+class Foam:
+    """The points of the pad, and the forces on them."""
+
+    def __init__(self, object_n_per_m):
+        count = CELLS * FINE
+        line = (np.arange(count) + 0.5) / FINE * PITCH - CELLS * PITCH / 2
+        self.x, self.y = (grid.ravel() for grid in np.meshgrid(line, line))
+        self.centres = (np.arange(CELLS) + 0.5 - CELLS / 2) * PITCH
+        below = np.vectorize(lambda x: 0.5 * (1.0 + math.erf(x / SPREAD / math.sqrt(2.0))))
+        ends = self.centres[:, None] - line[None, :]
+        self.shares = below(ends + PITCH / 2) - below(ends - PITCH / 2)
+        # The object gives way behind the foam, so that it stiffens later.
+        soft = 1.0 / (1.0 + FOAM / object_n_per_m)
+        self.stiffness, self.cubic = FOAM * soft / FINE**2, CUBIC * soft**4 / FINE**2
+        self.soft = SOFT / soft
+        self.bristles, self.creep, self.force = np.zeros((2, count**2)), np.zeros(count**2), np.zeros(count**2)
+
+    def press(self, depth, slide, dt):
+        """Returns the force and the torque at the middle of the pad, in its axes."""
+        pressed = depth > 0.0
+        depth = np.maximum(depth, 0.0)
+        self.creep += (depth - self.creep) * dt / CREEP_S
+        more = np.maximum(depth - self.soft, 0.0)
+        force = self.stiffness * (depth - CREEP * self.creep) + self.cubic * more**3
+        self.force = np.maximum(force, 0.0) * pressed
+        self.bristles = (self.bristles + slide * dt) * pressed
+        most = FRICTION * self.force / (BRISTLES * self.stiffness)
+        length = np.maximum(np.hypot(*self.bristles), 1e-12)
+        self.bristles *= np.minimum(1.0, most / length)
+        fx, fy = -BRISTLES * self.stiffness * self.bristles
+        force = np.array([fx.sum(), fy.sum(), -self.force.sum()])
+        torque = [-(self.force @ self.y), self.force @ self.x, self.x @ fy - self.y @ fx]
+        return force, np.array(torque)
+
+    def units(self):
+        """What each tactel feels."""
+        count = CELLS * FINE
+        return self.shares @ self.force.reshape(count, count) @ self.shares.T / NEWTON
+
+
+class World:
+    def __init__(self, args):
+        self.scene, self.foam, self.random = Scene(args), Foam(args.stiffness), np.random.default_rng(args.seed)
+        spec = mujoco.MjSpec.from_file(str(MODEL))
+        spec.option.timestep, spec.option.integrator = DT / SUBSTEPS, mujoco.mjtIntegrator.mjINT_IMPLICITFAST
+        # The controller compensates the weight.
+        spec.option.gravity = [0.0, 0.0, 0.0]
+        for name, inertia in zip(NAMES, DRIVES):
+            joint = spec.joint(name)
+            joint.armature, joint.frictionloss = inertia, JOINT_FRICTION
+        site = spec.body("lwr_7_link").add_site()
+        site.name, site.pos = "pad", [0.0, 0.0, SENSOR]
+        self.model = spec.compile()
+        self.data = mujoco.MjData(self.model)
+        self.data.qpos[:] = START
+        mujoco.mj_forward(self.model, self.data)
+        self.site, self.body = self.model.site("pad").id, self.model.body("lwr_7_link").id
+        inertia = np.zeros((len(NAMES), len(NAMES)))
+        mujoco.mj_fullM(self.model, self.data, inertia)
+        self.damping = 2.0 * DAMPING_RATIO * np.sqrt(STIFFNESS * np.diag(inertia))
+        self.q_eq = np.array(START)
+        self.axes0, self.at0 = (value.copy() for value in self.pad())
+        self.gains = np.exp(self.random.normal(0.0, GAINS, (CELLS, CELLS)))
+
+    def pad(self):
+        """Axes and middle of the pad, in the base of the arm."""
+        return self.data.site_xmat[self.site].reshape(3, 3), self.data.site_xpos[self.site]
+
+    def touch(self, dt):
+        axes, at = self.pad()
+        local, middle = self.axes0.T @ axes, self.axes0.T @ (at - self.at0)
+        points = middle[:, None] + local[:, :1] * self.foam.x + local[:, 1:2] * self.foam.y
+        motion = np.zeros(6)
+        mujoco.mj_objectVelocity(self.model, self.data, mujoco.mjtObj.mjOBJ_SITE, self.site, motion, 1)
+        turn, speed = motion[:3], motion[3:]
+        slide = np.array([speed[0] - turn[2] * self.foam.y, speed[1] + turn[2] * self.foam.x])
+        force, torque = self.foam.press(self.scene.depth(points), slide, dt)
+        return axes @ force, axes @ torque, at.copy()
+
+    def step(self, velocity):
+        dt = DT / SUBSTEPS
+        for _ in range(SUBSTEPS):
+            self.q_eq = self.q_eq + np.array(velocity) * dt
+            force, torque, at = self.touch(dt)
+            applied = STIFFNESS * (self.q_eq - self.data.qpos) - self.damping * self.data.qvel
+            mujoco.mj_applyFT(self.model, self.data, force, torque, at, self.body, applied)
+            self.data.qfrc_applied[:] = applied
+            mujoco.mj_step(self.model, self.data)
+            mujoco.mj_kinematics(self.model, self.data)
+            mujoco.mj_comPos(self.model, self.data)
+
+    def image(self, units):
+        noisy = units * self.gains * (1.0 + self.random.normal(0.0, COMMON)) + self.random.normal(0.0, OWN, units.shape)
+        return np.clip(np.round(COUNTS * noisy), 0, 4095)
+
+
+def hello(args):
+    return {
+        "type": "hello", "proto": 1, "dt": DT, "lockstep": True, "task": args.scene, "joints": NAMES,
+        "q_min": [-q for q in Q_MAX], "q_max": Q_MAX, "dq_max": DQ_MAX, "urdf": "lwr4p", "tip": "lwr_7_link",
+        "T_es": [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, SENSOR, 0, 0, 0, 1], "rows": CELLS, "cols": CELLS, "pitch": PITCH,
+        "counts_per_unit": COUNTS, "newton_per_unit": NEWTON, "threshold_units": THRESHOLD,
+    }
+
+
+def features(units, centres):
+    """Pressure [units] and place [tactels] of what is above the threshold; not a number without a contact."""
+    felt = units * (units > THRESHOLD)
+    total = felt.sum()
+    if total == 0.0:
+        return [math.nan] * 3
+    return [total / (felt > 0.0).sum(), felt.sum(0) @ centres / total / PITCH, felt.sum(1) @ centres / total / PITCH]
+
+
+def response(times, values, target, within):
+    """Time until the values stay within a distance for 0.3 s."""
+    stay = round(0.3 / DT)
+    near = np.convolve(np.abs(np.nan_to_num(values, nan=1e9) - target) <= within, np.ones(stay), "valid") >= stay
+    return float(times[near.argmax()] - times[0]) if near.any() else None
+
+
+def seen(rows):
+    """What a run shows from its first touch on: times in s, forces in N, pressures in units, places in tactels."""
+    rows = np.array(rows)
+    touched = rows[:, 1] > 0.05
+    if not touched.any():
+        return {"touched": None}
+    rows = rows[touched.argmax():]
+    times, force, pressure, x, y, felt, felt_x, felt_y = rows.T
+    last = slice(-round(5.0 / DT), None)
+    mean = np.convolve(felt, np.ones(10) / 10, "valid")
+    return {
+        "touched": float(times[0]), "lost": int((force[25:] < 0.02).sum()), "most": float(force.max()),
+        "response": {name: response(times, values, target, within) for name, values, target, within in
+                     (("pressure", pressure, 1.0, 0.12), ("x", x, 0.0, 0.3), ("y", y, 0.0, 0.3))},
+        "error": [float(np.mean(felt[last]) - 1.0), float(np.mean(felt_x[last])), float(np.mean(felt_y[last]))],
+        "deviation": [float(np.std(values[last])) for values in (felt, felt_x, felt_y)],
+        "mean_deviation": float(np.std(mean[last])),
+        "true_rms": float(np.sqrt(np.mean((pressure[last] - 1.0) ** 2))),
+    }
+
+
+def serve(lines, args, world):
+    """Frame after frame, until somebody ends it. Returns what was seen."""
+    def say(message):
+        lines.write(json.dumps(message).encode() + b"\n")
+        lines.flush()
+
+    say(hello(args))
+    rows, end = [], None
+    for frame in range(round(args.seconds / DT)):
+        units = world.foam.units()
+        image = world.image(units)
+        truth, felt = features(units, world.foam.centres), features(image / COUNTS, world.foam.centres)
+        rows.append([frame * DT, units.sum() * NEWTON, *truth, *felt])
+        q, dq = world.data.qpos.tolist(), world.data.qvel.tolist()
+        say({"type": "obs", "seq": frame, "t": frame * DT, "q": q, "dq": dq, "q_eq": world.q_eq.tolist(),
+             "img": image.ravel().tolist()})
+        line = lines.readline()
+        answer = json.loads(line) if line else {"type": "end", "reason": None}
+        if answer["type"] == "end":
+            end = answer["reason"]
+            break
+        world.step(answer["dq"])
+    else:
+        say({"type": "end"})
+    return {"frames": len(rows), "end": end, **seen(rows)}
+
+
+def main():
+    parser = argparse.ArgumentParser()
+    parser.add_argument("--port", type=int, default=0)
+    parser.add_argument("--scene", default="ball", choices=["ball", "pen", "box", "edge"])
+    parser.add_argument("--offset", type=float, nargs=2, default=[0.0, 0.0], help="along the sensor's x and y [m]")
+    parser.add_argument("--gap", type=float, default=0.006, help="from the pad to the object at the start [m]")
+    parser.add_argument("--radius", type=float, default=0.04, help="of ball or pen [m]")
+    parser.add_argument("--size", type=float, nargs=2, default=[0.04, 0.03], help="of the box, along its axes [m]")
+    parser.add_argument("--angle", type=float, default=0.0, help="from the sensor's x [rad]")
+    parser.add_argument("--stiffness", type=float, default=1e6, help="of the object behind a tactel [N/m]")
+    parser.add_argument("--seconds", type=float, default=10.0)
+    parser.add_argument("--seed", type=int, default=1)
+    args = parser.parse_args()
+    world = World(args)
+    with socket.create_server(("127.0.0.1", args.port)) as server:
+        server.settimeout(60.0)
+        print(server.getsockname()[1], flush=True)
+        connection, _ = server.accept()
+    connection.settimeout(60.0)
+    connection.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+    with connection, connection.makefile("rwb") as lines:
+        said = serve(lines, args, world)
+    print(json.dumps(said), flush=True)
+
+
+if __name__ == "__main__":
+    sys.exit(main())
