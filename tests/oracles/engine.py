@@ -25,7 +25,7 @@ SENSOR = 0.03
 NAMES = [f"lwr_{name}_joint" for name in ("a1", "a2", "e1", "a3", "a4", "a5", "a6")]
 Q_MAX = [math.radians(degrees) for degrees in (170, 120, 170, 120, 170, 120, 170)]
 DQ_MAX = [math.radians(degrees) for degrees in (110, 110, 128, 128, 204, 184, 184)]
-MODEL = Path(__file__).parents[2] / "graphs/robots/lwr4p.urdf"
+MODEL = Path(__file__).resolve().parents[2] / "graphs/robots/lwr4p.urdf"
 # What the torque control leaves of the inertia of the drives [kg m²], and the friction of the joints [N m].
 DRIVES = [0.96, 0.92, 0.6, 0.62, 0.24, 0.12, 0.12]
 JOINT_FRICTION = 0.1
