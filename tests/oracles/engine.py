@@ -1,4 +1,4 @@
-"""A simulator for the lockstep bridge whose arm is computed by a physics engine: MuJoCo (`pip install mujoco`).
+"""A simulator for the lockstep bridge whose arm is computed by a physics engine: MuJoCo (`pip install mujoco==4.0.0`).
 
 MuJoCo integrates a KUKA LWR 4+ with the masses of its model, the inertia of its drives, friction in its joints, and
 joint impedance. The pad is a foam of 48 by 48 points that stiffens, creeps, and sticks to the object until it slips:
@@ -26,14 +26,15 @@ NAMES = [f"lwr_{name}_joint" for name in ("a1", "a2", "e1", "a3", "a4", "a5", "a
 Q_MAX = [math.radians(degrees) for degrees in (170, 120, 170, 120, 170, 120, 170)]
 DQ_MAX = [math.radians(degrees) for degrees in (110, 110, 128, 128, 204, 184, 184)]
 MODEL = Path(__file__).resolve().parents[2] / "graphs/robots/lwr4p.urdf"
-# What the torque control leaves of the inertia of the drives [kg m²], and the friction of the joints [N m].
+# Inertia of the drives that remains under torque control [kg m²], and the friction of the joints [N m].
 DRIVES = [0.96, 0.92, 0.6, 0.62, 0.24, 0.12, 0.12]
 JOINT_FRICTION = 0.1
 STIFFNESS, DAMPING_RATIO = 200.0, 0.2
 # The foam of a tactel [N/m, N/m³], where it stiffens [m], its creep, and the spread of a force over the tactels [m].
 FOAM, CUBIC, SOFT, CREEP, CREEP_S, SPREAD = 300.0, 8e7, 0.0025, 0.05, 1.5, 0.003
+# Coefficient of friction, and the stiffness of a bristle over that of the foam.
 FRICTION, BRISTLES = 0.35, 0.6
-# Noise of a frame that all tactels share, of each tactel [units], and the errors of their gains.
+# Noise that all tactels of a frame share (of the reading), noise of each tactel [units], spread of the gains.
 COMMON, OWN, GAINS = 0.04, 0.03, 0.05
 
 
@@ -72,7 +73,7 @@ class Foam:
         below = np.vectorize(lambda x: 0.5 * (1.0 + math.erf(x / SPREAD / math.sqrt(2.0))))
         ends = self.centres[:, None] - line[None, :]
         self.shares = below(ends + PITCH / 2) - below(ends - PITCH / 2)
-        # The object gives way behind the foam, so that it stiffens later.
+        # The object gives way behind the foam, so the foam stiffens at a larger depth.
         soft = 1.0 / (1.0 + FOAM / object_n_per_m)
         self.stiffness, self.cubic = FOAM * soft / FINE**2, CUBIC * soft**4 / FINE**2
         self.soft = SOFT / soft
@@ -151,6 +152,7 @@ class World:
             mujoco.mj_step(self.model, self.data)
             mujoco.mj_kinematics(self.model, self.data)
             mujoco.mj_comPos(self.model, self.data)
+            mujoco.mj_comVel(self.model, self.data)
 
     def image(self, units):
         noisy = units * self.gains * (1.0 + self.random.normal(0.0, COMMON)) + self.random.normal(0.0, OWN, units.shape)
@@ -183,7 +185,13 @@ def response(times, values, target, within):
 
 
 def seen(rows):
-    """What a run shows from its first touch on: times in s, forces in N, pressures in units, places in tactels."""
+    """What a run shows from its first touch on: times in s, forces in N, pressures in units, places in tactels.
+
+    `lost` counts the frames without a contact from 0.1 s after the first touch on.
+    """
+    def number(value):
+        return float(value) if math.isfinite(value) else None
+
     rows = np.array(rows)
     touched = rows[:, 1] > 0.05
     if not touched.any():
@@ -196,10 +204,10 @@ def seen(rows):
         "touched": float(times[0]), "lost": int((force[25:] < 0.02).sum()), "most": float(force.max()),
         "response": {name: response(times, values, target, within) for name, values, target, within in
                      (("pressure", pressure, 1.0, 0.12), ("x", x, 0.0, 0.3), ("y", y, 0.0, 0.3))},
-        "error": [float(np.mean(felt[last]) - 1.0), float(np.mean(felt_x[last])), float(np.mean(felt_y[last]))],
-        "deviation": [float(np.std(values[last])) for values in (felt, felt_x, felt_y)],
-        "mean_deviation": float(np.std(mean[last])),
-        "true_rms": float(np.sqrt(np.mean((pressure[last] - 1.0) ** 2))),
+        "error": [number(np.mean(felt[last]) - 1.0), number(np.mean(felt_x[last])), number(np.mean(felt_y[last]))],
+        "deviation": [number(np.std(values[last])) for values in (felt, felt_x, felt_y)],
+        "mean_deviation": number(np.std(mean[last])),
+        "true_rms": number(np.sqrt(np.mean((pressure[last] - 1.0) ** 2))),
     }
 
 
@@ -217,9 +225,12 @@ def serve(lines, args, world):
         truth, felt = features(units, world.foam.centres), features(image / COUNTS, world.foam.centres)
         rows.append([frame * DT, units.sum() * NEWTON, *truth, *felt])
         q, dq = world.data.qpos.tolist(), world.data.qvel.tolist()
-        say({"type": "obs", "seq": frame, "t": frame * DT, "q": q, "dq": dq, "q_eq": world.q_eq.tolist(),
-             "img": image.ravel().tolist()})
-        line = lines.readline()
+        try:
+            say({"type": "obs", "seq": frame, "t": frame * DT, "q": q, "dq": dq, "q_eq": world.q_eq.tolist(),
+                 "img": image.ravel().tolist()})
+            line = lines.readline()
+        except OSError:
+            line = b""
         answer = json.loads(line) if line else {"type": "end", "reason": None}
         if answer["type"] == "end":
             end = answer["reason"]

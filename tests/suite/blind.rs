@@ -111,7 +111,7 @@ fn a_limiter_of_another_arm_does_not_make_its_contact_count() {
 
 #[test]
 fn without_an_object_every_approach_stops_within_its_bound() {
-    for task in ["hybrid", "force", "edge", "explore"] {
+    for task in ["hybrid", "force", "position", "edge", "explore"] {
         let request = Request::file(workspace().join(format!("graphs/{task}.toml")))
             .set("devices.bench.objects=[]")
             .set("modes.approach.fail={ after_ms = 9000 }")

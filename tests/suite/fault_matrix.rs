@@ -23,7 +23,7 @@ fn a_task_withstands_faults_of_the_pad_the_commands_the_arm_and_the_object() {
     let cells = json["cells"].as_array().unwrap();
     let broken: Vec<&Value> = cells.iter().filter(|cell| cell["ok"] != true).collect();
     assert_eq!((said.code, said.err.as_str()), (0, ""), "{broken:#?}");
-    // The force is controlled at any place, so nothing slides, and no limit acts for long.
+    // The force is controlled at any place, so nothing slides, and no limit acts for 20 ms.
     let missing: Vec<&str> =
         json["missing"].as_array().unwrap().iter().filter_map(|one| one["phase"].as_str()).collect();
     assert_eq!(missing, ["sliding", "at a limit"]);

@@ -82,7 +82,7 @@ fn a_graph_without_a_zero_says_so() {
 
 #[test]
 fn a_light_touch_is_not_taken_as_a_zero() {
-    let words = ["--send", "1.1s:stop", "--send", "1.5s:tare", "--for", "2.4s", "--send", "2.3s:resume", "--quiet"];
+    let words = ["--send", "1.112s:stop", "--send", "1.5s:tare", "--for", "2.4s", "--send", "2.3s:resume", "--quiet"];
     let run = say(&[&["run", "graphs/hybrid.toml"], &words[..]].concat());
     assert!(
         run.code == 0 && run.err.contains("`tare` has no effect: `touch.calibrate`: something touches"),
@@ -93,7 +93,7 @@ fn a_light_touch_is_not_taken_as_a_zero() {
 
 #[test]
 fn a_task_is_tared_only_halted_and_without_a_contact_and_a_replay_has_it() {
-    // It stops before the contact at 0.78 s, and goes on afterwards.
+    // It stops before the contact at 1.1 s, and goes on afterwards.
     let words = ["--send", "0.2s:tare", "--send", "0.3s:stop", "--send", "0.8s:TARE", "--send", "1.2s:resume"];
     let late = ["--send", "4s:stop", "--send", "4.6s:tare", "--send", "5s:resume", "--for", "6s"];
     let folder = tempfile::tempdir().unwrap();

@@ -36,7 +36,7 @@ fn a_task_whose_object_is_missing_stops_alone() {
     let both = trace(&folder.request().set(NO_BALL), &[]);
     assert_same_bits(&both, "right", &trace(&folder.alone("right"), &[]));
     assert_eq!((both.failures(), &both.fault), (vec!["left"], &None));
-    // The self-test of 0.16 s, then 60 mm at 8 mm/s, at which the arm arrives gently.
+    // The self-test of 0.16 s, then 60 mm at 8 mm/s.
     let Some(TaskEnd::Failed(fault)) = both.task("left").end() else { panic!("it has failed") };
     assert!((7.66..7.8).contains(&(fault.time as f64 * 1e-9)), "{fault}");
     let end = both.fastest["left"].len();

@@ -175,8 +175,10 @@ fn while_it_runs_a_terminal_sees_the_image_and_a_pipe_nothing() {
 
 #[test]
 fn while_it_runs_a_terminal_sees_the_mode_the_limits_and_what_holds_the_commands() {
-    let seen = on_a_terminal(100, &["run", HYBRID, "--realtime", "--for", "2.4s"]);
-    for text in ["mode approach for 0.", "mode servo for 0.", "limited by move."] {
+    // So fast that the pad has to slow the approach down.
+    let fast = "modes.approach.set.reach.twist=[0, 0, 0.015, 0, 0, 0]";
+    let seen = on_a_terminal(100, &["run", HYBRID, "--realtime", "--for", "2s", "--set", fast]);
+    for text in ["mode approach for 0.", "mode servo for 0.", "limited by move.contact.force to "] {
         assert!(seen.contains(text), "{text}: {seen}");
     }
     assert!(!seen.contains("commands held"), "{seen}");

@@ -228,7 +228,7 @@ impl Run {
             }
             Attack::CutPad => {
                 self.pad.cut();
-                let from = self.now() + 1.0 / RATE_HZ + PAD_AGE + silence;
+                let from = self.now() + PAD_AGE + silence;
                 thread::sleep(watch);
                 let to = self.now();
                 self.pad.swallow(false);
@@ -236,7 +236,7 @@ impl Run {
             }
             Attack::CutArm => {
                 self.arm.cut();
-                let from = self.now() + FRI_MS * 1e-3 + silence;
+                let from = self.now() + silence;
                 thread::sleep(watch);
                 self.arm.swallow(false);
                 thread::sleep(watch);

@@ -22,7 +22,7 @@ const CUT: u8 = 2;
 const IDLE: Duration = Duration::from_millis(1);
 /// Time after which a relay without datagrams looks whether its cable is still there.
 const LOOK: Duration = Duration::from_millis(50);
-/// Time after which there is no packet to cut.
+/// Time that `cut` waits for a packet.
 const SILENCE: Duration = Duration::from_secs(1);
 
 /// What the wires of a cable do. Its relays end with it.
@@ -34,20 +34,21 @@ pub(super) struct Cable {
 }
 
 impl Cable {
-    /// Lets all bytes pass, or swallows them from its return on.
+    /// Lets all bytes pass, or swallows them: then no byte passes after it has returned.
     pub(super) fn swallow(&self, swallows: bool) {
         self.does.store(if swallows { SWALLOW } else { PASS }, Ordering::SeqCst);
         self.wait_for_what_passes();
     }
 
     /// Cuts the next packet in its middle, and swallows the rest. A connection ends there, and there is no other one.
-    /// Returns after the cut, which a busy machine may delay.
+    /// Returns after the cut, which a busy machine may delay. If no packet comes for a second, it only swallows.
     pub(super) fn cut(&self) {
         self.does.store(CUT, Ordering::SeqCst);
         let end = Instant::now() + SILENCE;
         while self.does.load(Ordering::SeqCst) == CUT && Instant::now() < end {
             thread::sleep(IDLE);
         }
+        let _ = self.does.compare_exchange(CUT, SWALLOW, Ordering::SeqCst, Ordering::SeqCst);
         self.wait_for_what_passes();
     }
 
@@ -76,7 +77,7 @@ impl Wire {
         self.does.upgrade().is_some_and(|does| does.load(Ordering::SeqCst) == state)
     }
 
-    /// Does what passes bytes on; the cable waits for its end.
+    /// Runs what passes bytes on. The cable can wait for its end.
     fn pass<T>(&self, passes: impl FnOnce() -> T) -> T {
         let _passing = self.passing.lock();
         passes()
@@ -109,6 +110,7 @@ pub(super) fn tcp(to: u16, cable: &Cable) -> u16 {
             let Some(server) = server.ok().filter(|_| wire.has_state(PASS)) else { continue };
             for stream in [&client, &server] {
                 stream.set_nodelay(true).unwrap();
+                stream.set_write_timeout(Some(SILENCE)).unwrap();
             }
             let ends = [(&client, &server), (&server, &client)];
             for (from, to) in ends.map(|(from, to)| (from.try_clone().unwrap(), to.try_clone().unwrap())) {
@@ -210,6 +212,8 @@ fn move_bytes(from: &mut File, to: &mut File, wire: &Wire) -> usize {
     while !rest.is_empty() && wire.is_there() {
         match to.write(rest) {
             Ok(count) => rest = &rest[count..],
+            // Whoever swallows waits for this.
+            Err(_) if wire.has_state(SWALLOW) => return 0,
             Err(error) if error.kind() == ErrorKind::WouldBlock => thread::sleep(IDLE),
             Err(_) => return 0,
         }

@@ -133,6 +133,7 @@ impl NodeRunner {
 
     /// Steps the node if a trigger is new or lost, or makes its outputs absent if a required input is. Sets the tick's
     /// stamp to the oldest stamp of the triggers.
+    // A call for each node, and for its inputs and outputs, costs 700 instructions of a tick: see `.ci/instructions`.
     #[inline(always)]
     pub(crate) fn visit(&mut self, tick: &mut Tick, bus: &mut Bus) {
         for aged in &self.aged {
