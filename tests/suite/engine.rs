@@ -55,18 +55,19 @@ const PROMISES: [Promise; 4] = [
 
 /// What is wrong with a run, for each thing that is; empty if all holds.
 fn broken(seen: &Value, promise: &Promise, object: usize) -> Vec<String> {
-    let number = |value: &Value| value.as_f64().unwrap_or(ANY);
+    // What was not measured holds no bound.
+    let number = |value: &Value| value.as_f64().unwrap_or(f64::MAX);
     let mut wrong = Vec::new();
     // A frame lasts 4 ms. Rolling meets a corner of the box first, and may leave it for a moment.
     if number(&seen["lost"]) > if promise.task == "rolling" { 25.0 } else { 0.0 } {
         wrong.push(format!("it left the object for {} frames", seen["lost"]));
     }
     for (i, name) in FEATURES.into_iter().enumerate() {
-        let response = seen["response"][name].as_f64().unwrap_or(f64::MAX);
+        let response = number(&seen["response"][name]);
         if response > promise.response_s[object][i] {
             wrong.push(format!("{name} took {response} s"));
         }
-        let error = seen["error"][i].as_f64().unwrap_or(f64::MAX).abs();
+        let error = number(&seen["error"][i]).abs();
         if error > promise.error[i] {
             wrong.push(format!("{name} is {error} off"));
         }
