@@ -3,8 +3,9 @@
 use std::io::{BufRead, BufReader};
 use std::process::{Child, Command, Stdio};
 use std::sync::atomic::{AtomicUsize, Ordering};
+use std::time::Duration;
 
-use tactflow_runtime::device::{Description, Device, DeviceError, Driver, Link, Live, Opened, Output};
+use tactflow_runtime::device::{Attached, Description, Device, DeviceError, Driver, Link, Live, Opened, Output};
 use tactflow_runtime::engine::{self, End, Engine, RunOptions};
 use tactflow_runtime::fault::Cause;
 use tactflow_runtime::graph::{Compiled, Request, compile};
@@ -87,6 +88,56 @@ fn every_sample_counts_once_and_silence_makes_it_old() {
     assert!(*ages.last().unwrap() > 200.0, "{ages:?}");
 }
 
+/// A driver whose samples are their own numbers, and the numbers of those that the newest commands answer.
+struct Numbering {
+    number: Output<Scalar>,
+    answered: Output<Scalar>,
+}
+
+#[async_trait::async_trait]
+impl Live for Numbering {
+    async fn run(self: Box<Self>, mut link: Link) -> Result<(), DeviceError> {
+        for number in 0.. {
+            let (stamp, answered) = (link.arrival(), link.answers().map_or(-1.0, |number| number as f64));
+            link.publish(|samples| {
+                *samples.write(self.number, stamp, number) = number as f64;
+                *samples.write(self.answered, stamp, number) = answered;
+            });
+            let stopped = link.stopped();
+            tokio::select! {
+                () = stopped => break,
+                () = tokio::time::sleep(Duration::from_millis(1)) => {}
+            }
+        }
+        Ok(())
+    }
+}
+
+#[test]
+fn a_driver_knows_which_sample_the_commands_answer() {
+    let mut description = Description::every(0.001);
+    let mut length = description.fills("length");
+    let [number, answered] = ["value", "answered"].map(|name| length.output(name, ScalarShape::of(Unit::METRE)));
+    let driver = Box::new(Numbering { number, answered });
+    let mut graph = Attached::start("numbering", description, driver).unwrap();
+    let newest = |graph: &mut Attached, output| {
+        while !graph.receive() {
+            std::thread::yield_now();
+        }
+        *graph.read(output).unwrap()
+    };
+    assert_eq!((newest(&mut graph, answered), newest(&mut graph, answered)), (-1.0, -1.0), "no command was sent");
+    for _ in 0..100 {
+        let seen = newest(&mut graph, number);
+        // Samples that come later are not answered, even if the driver has published them already.
+        std::thread::sleep(Duration::from_micros(1500));
+        graph.send();
+        let answers: Vec<f64> = std::iter::repeat_with(|| newest(&mut graph, answered)).take(3).collect();
+        assert_eq!(answers[2], seen, "{answers:?}");
+    }
+    graph.stop("the test is over").unwrap();
+}
+
 /// A driver that panics.
 #[derive(Describe)]
 struct Brittle;
@@ -151,7 +202,7 @@ impl Live for Flaky {
             let stopped = link.stopped();
             tokio::select! {
                 () = stopped => break,
-                () = tokio::time::sleep(std::time::Duration::from_millis(10)) => {}
+                () = tokio::time::sleep(Duration::from_millis(10)) => {}
             }
         }
         Ok(())

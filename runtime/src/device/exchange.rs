@@ -13,6 +13,8 @@ pub struct Samples {
     pub(crate) ports: Vec<PortSample>,
     /// How often any port was written.
     pub(crate) writes: u64,
+    /// The sequence number that was written last.
+    pub(crate) newest: Option<u64>,
     pub(crate) counts: Vec<(&'static str, u64)>,
     /// The device's own clock, if stamps are made of it.
     pub(crate) clock: Option<ClockReading>,
@@ -121,6 +123,7 @@ impl Samples {
         (sample.stamp, sample.sequence, sample.state) = (stamp, sequence, state);
         sample.writes += 1;
         self.writes += 1;
+        self.newest = Some(sequence);
         sample
     }
 
@@ -146,7 +149,7 @@ impl Samples {
         }
         self.ports.clone_from(&other.ports);
         self.counts.clone_from(&other.counts);
-        (self.writes, self.clock) = (other.writes, other.clock);
+        (self.writes, self.newest, self.clock) = (other.writes, other.newest, other.clock);
     }
 }
 
@@ -155,10 +158,10 @@ impl Samples {
 pub(crate) struct Grant {
     /// It grows when the operator resumes after a lost lease.
     pub(crate) epoch: u64,
-    /// Time of the tick that computed the commands [ns].
-    pub(crate) since: i64,
-    /// Time until which they are valid [ns].
+    /// Time until which the commands are valid [ns].
     pub(crate) until: i64,
+    /// The sequence number that was written last among the samples that they were computed from.
+    pub(crate) seen: Option<u64>,
 }
 
 /// The commands of a device, and the reports to it.

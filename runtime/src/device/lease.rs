@@ -171,7 +171,7 @@ mod tests {
 
     fn grant(commands: &mut Commands, velocity: Command, values: [f64; 2], epoch: u64, now: i64) {
         commands.command(velocity, &values);
-        commands.grant = Grant { epoch, since: now, until: now + 20 * MS };
+        commands.grant = Grant { epoch, until: now + 20 * MS, seen: None };
     }
 
     #[test]

@@ -163,10 +163,10 @@ impl Link {
         self.mute.load(Ordering::Acquire)
     }
 
-    /// Returns the time since the tick that computed the newest commands.
-    pub fn age(&mut self) -> Duration {
-        let now = self.epoch.elapsed().as_nanos() as i64;
-        Duration::from_nanos((now - self.commands.read().grant.since).max(0) as u64)
+    /// Returns which sample the newest commands answer: the sequence number that was [written](Samples::write) last among
+    /// those that they were computed from. `None` before there is such a sample.
+    pub fn answers(&mut self) -> Option<u64> {
+        self.commands.read().grant.seen
     }
 
     /// Waits for the next commands, for a period of the device and a quarter of its
@@ -226,6 +226,8 @@ pub(crate) struct Linked {
     moves_until: Option<i64>,
     /// Time of the last tick that sent commands [ns].
     sent: Option<i64>,
+    /// The sequence number that was written last among the samples that were received.
+    seen: Option<u64>,
     driver: Option<JoinHandle<Result<(), DeviceError>>>,
 }
 
@@ -295,6 +297,7 @@ pub(crate) fn start(name: &str, driver: Box<dyn Live>, setup: LinkSetup<'_>) -> 
         lost: 0,
         moves_until: None,
         sent: None,
+        seen: None,
         driver,
     })
 }
@@ -303,7 +306,7 @@ impl Linked {
     /// Hands over the commands of the tick at `now` [ns], which are valid for `lease` [ns].
     pub(crate) fn send(&mut self, commands: &mut Commands, now: i64, lease: i64) {
         let until = now + lease;
-        commands.grant = Grant { epoch: self.epoch, since: now, until };
+        commands.grant = Grant { epoch: self.epoch, until, seen: self.seen };
         self.moves_until = (!commands.are_zero()).then_some(until);
         self.sent = Some(now);
         self.commands.input_buffer_mut().copy_from(commands);
@@ -321,6 +324,7 @@ impl Linked {
         let before = samples.writes;
         if self.samples.update() {
             std::mem::swap(samples, self.samples.output_buffer_mut());
+            self.seen = samples.newest;
         }
         samples.writes != before
     }

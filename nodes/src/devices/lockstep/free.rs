@@ -50,7 +50,6 @@ impl Live for FreeRunning {
             outbox: Vec::new(),
             frames: Frames::new(self.hello.clone()),
             begin: None,
-            published: None,
             sent: vec![0.0; self.hello.joints.len()],
             answered: None,
             sent_at: Instant::now(),
@@ -108,8 +107,6 @@ struct Session {
     frames: Frames,
     /// Time of the simulator at the first frame [s].
     begin: Option<f64>,
-    /// The last frame that was published, and when.
-    published: Option<(u64, Instant)>,
     /// The last command [rad/s], the frame that it answered, and when it was sent.
     sent: Vec<f64>,
     answered: Option<u64>,
@@ -181,18 +178,14 @@ impl Session {
             cells.iter_mut().zip(&obs.img).for_each(|(cell, counts)| *cell = *counts as f32);
             self.arm.write(samples, stamp, obs.seq, [&obs.q, &obs.q_eq]);
         });
-        self.published = Some((obs.seq, Instant::now()));
     }
 
     /// Sends the command that holds now, if it answers a frame, differs from the last one, or keeps the simulator from
     /// its timeout.
     fn send(&mut self, link: &mut Link) {
-        let age = link.age();
+        let seq = link.answers();
         let commands = link.commands();
         let dq = commands.joints(self.arm.velocity);
-        // A tick that began before the frame was published has not seen it.
-        let seen = self.published.filter(|(_, at)| age < at.elapsed()).map(|(seq, _)| seq);
-        let seq = seen.or(self.answered).or(self.published.map(|(seq, _)| seq));
         let is_due = self.answered != seq || self.sent != dq || self.sent_at.elapsed() >= KEEP_ALIVE;
         let Some(seq) = seq.filter(|_| is_due) else { return };
         let est = commands.report(self.arm.contact).map(|pose| pose.0.translation.vector.into());
