@@ -2,9 +2,11 @@
 
 MuJoCo integrates a KUKA LWR 4+ with the masses of its model, the inertia of its drives, friction in its joints, and
 joint impedance. The pad is a foam of 48 by 48 points that stiffens, creeps, and sticks to the object until it slips:
-each point has a bristle. The objects do not move. It listens, prints its port, serves one graph and prints what it saw.
+each point has a bristle. It listens, prints its port, serves one graph and prints what it saw.
 
     python3 engine.py --scene box --offset 0.01 -0.005 --angle 0.4 --seconds 10 --port 7777
+
+An object stands still, or it is moved, turned or made stiffer at times that `--help` names; cells of the pad can fail.
 """
 
 import argparse
@@ -29,7 +31,7 @@ MODEL = Path(__file__).resolve().parents[2] / "graphs/robots/lwr4p.urdf"
 # Inertia of the drives that remains under torque control [kg m²], and the friction of the joints [N m].
 DRIVES = [0.96, 0.92, 0.6, 0.62, 0.24, 0.12, 0.12]
 JOINT_FRICTION = 0.1
-STIFFNESS, DAMPING_RATIO = 200.0, 0.2
+DAMPING_RATIO = 0.2
 # The foam of a tactel [N/m, N/m³], where it stiffens [m], its creep, and the spread of a force over the tactels [m].
 FOAM, CUBIC, SOFT, CREEP, CREEP_S, SPREAD = 300.0, 8e7, 0.0025, 0.05, 1.5, 0.003
 # Coefficient of friction, and the stiffness of a bristle over that of the foam.
@@ -42,20 +44,50 @@ class Scene:
     """An object in the axes of the sensor at the start: how deep points are in it [m]."""
 
     def __init__(self, args):
-        (self.x, self.y), self.gap, self.radius, self.kind = args.offset, args.gap, args.radius, args.scene
+        self.radius, self.bend, self.kind = args.radius, args.bend, args.scene
         self.half = np.array([*args.size, 0.04]) / 2
-        self.sin, self.cos = math.sin(args.angle), math.cos(args.angle)
+        # Where it is and where it goes [m], its angle [rad], and how both change now.
+        self.place, self.angle = np.array([*args.offset, args.gap]), args.angle
+        self.goal, self.speed, self.velocity = self.place.copy(), args.speed, np.zeros(3)
+        self.moves = sorted(args.move)
+        self.rate, self.turn = math.radians(args.turn), 0.0
+        self.turns_from = args.turn_from
+
+    def advance(self, time, dt):
+        while self.moves and self.moves[0][0] <= time:
+            self.goal = self.goal + self.moves.pop(0)[1:]
+        way = self.goal - self.place
+        length = np.linalg.norm(way)
+        self.velocity = way / max(length / self.speed, dt)
+        self.turn = self.rate if time >= self.turns_from else 0.0
+        self.place, self.angle = self.place + self.velocity * dt, self.angle + self.turn * dt
+
+    def moves_with(self, x, y):
+        """Velocity of the object along the axes at the start, at points of the pad [m/s]."""
+        return self.velocity[0] - self.turn * (y - self.place[1]), self.velocity[1] + self.turn * (x - self.place[0])
+
+    def line(self, x, y):
+        """Place along and across the object [m], and the angle of its line there."""
+        x, y = x - self.place[0], y - self.place[1]
+        sin, cos = math.sin(self.angle), math.cos(self.angle)
+        along, across = x * cos + y * sin, y * cos - x * sin
+        if not self.bend:
+            return along, across, self.angle
+        # An arc: its centre is beside it. Along it is the length of the arc.
+        beside = self.bend - across
+        turned = np.arctan2(along, beside)
+        return self.bend * turned, self.bend - np.hypot(along, beside), self.angle + turned
 
     def depth(self, points):
-        x, y, z = points[0] - self.x, points[1] - self.y, points[2] - self.gap
-        along, across = x * self.cos + y * self.sin, y * self.cos - x * self.sin
+        along, across, _ = self.line(points[0], points[1])
+        x, y, z = (points[i] - self.place[i] for i in range(3))
         if self.kind == "ball":
             return self.radius - np.sqrt(x * x + y * y + (z - self.radius) ** 2)
         if self.kind == "pen":
             beyond = np.maximum(0.0, np.abs(along) - self.half[0])
             return self.radius - np.sqrt(beyond**2 + across**2 + (z - self.radius) ** 2)
         if self.kind == "edge":
-            return np.minimum(z, across)
+            return (z - np.abs(across)) * math.sqrt(0.5)
         # A box with edges of 2 mm.
         place = np.abs([along, across, z - self.half[2]]) - (self.half[:, None] - 0.002)
         outside = np.sqrt((np.maximum(place, 0.0) ** 2).sum(axis=0))
@@ -66,6 +98,7 @@ class Foam:
     """The points of the pad, and the forces on them."""
 
     def __init__(self, object_n_per_m):
+        self.stiffen(object_n_per_m)
         count = CELLS * FINE
         line = (np.arange(count) + 0.5) / FINE * PITCH - CELLS * PITCH / 2
         self.x, self.y = (grid.ravel() for grid in np.meshgrid(line, line))
@@ -73,11 +106,13 @@ class Foam:
         below = np.vectorize(lambda x: 0.5 * (1.0 + math.erf(x / SPREAD / math.sqrt(2.0))))
         ends = self.centres[:, None] - line[None, :]
         self.shares = below(ends + PITCH / 2) - below(ends - PITCH / 2)
-        # The object gives way behind the foam, so the foam stiffens at a larger depth.
+        self.bristles, self.creep, self.force = np.zeros((2, count**2)), np.zeros(count**2), np.zeros(count**2)
+
+    def stiffen(self, object_n_per_m):
+        """The object gives way behind the foam, so the foam stiffens at a larger depth."""
         soft = 1.0 / (1.0 + FOAM / object_n_per_m)
         self.stiffness, self.cubic = FOAM * soft / FINE**2, CUBIC * soft**4 / FINE**2
         self.soft = SOFT / soft
-        self.bristles, self.creep, self.force = np.zeros((2, count**2)), np.zeros(count**2), np.zeros(count**2)
 
     def press(self, depth, slide, dt):
         """Returns the force and the torque at the middle of the pad, in its axes."""
@@ -102,9 +137,30 @@ class Foam:
         return self.shares @ self.force.reshape(count, count) @ self.shares.T / NEWTON
 
 
+class Faults:
+    """What is wrong with the pad: tactels that stay at zero or at a reading, and frames that are no measurement."""
+
+    def __init__(self, args, random):
+        cells = random.permutation(CELLS**2)
+        self.dead, self.stuck = cells[: args.dead], cells[args.dead : args.dead + args.stuck]
+        self.garbage, self.repeat, self.random, self.last = list(args.garbage), args.repeat, random, None
+
+    def spoil(self, image, time):
+        image.ravel()[self.dead], image.ravel()[self.stuck] = 0, 3000
+        if self.garbage and time >= self.garbage[0]:
+            self.garbage.pop(0)
+            return np.full_like(image, 4095)
+        if self.last is not None and self.random.random() < self.repeat:
+            return self.last
+        self.last = image
+        return image
+
+
 class World:
     def __init__(self, args):
         self.scene, self.foam, self.random = Scene(args), Foam(args.stiffness), np.random.default_rng(args.seed)
+        self.time, self.stiffer = 0.0, sorted(args.stiffer)
+        self.faults = Faults(args, self.random)
         spec = mujoco.MjSpec.from_file(str(MODEL))
         spec.option.timestep, spec.option.integrator = DT / SUBSTEPS, mujoco.mjtIntegrator.mjINT_IMPLICITFAST
         # The controller compensates the weight.
@@ -121,7 +177,8 @@ class World:
         self.site, self.body = self.model.site("pad").id, self.model.body("lwr_7_link").id
         inertia = np.zeros((len(NAMES), len(NAMES)))
         mujoco.mj_fullM(self.model, self.data, inertia)
-        self.damping = 2.0 * DAMPING_RATIO * np.sqrt(STIFFNESS * np.diag(inertia))
+        self.springs = args.joint_stiffness
+        self.damping = 2.0 * DAMPING_RATIO * np.sqrt(self.springs * np.diag(inertia))
         self.q_eq = np.array(START)
         self.axes0, self.at0 = (value.copy() for value in self.pad())
         self.gains = np.exp(self.random.normal(0.0, GAINS, (CELLS, CELLS)))
@@ -130,23 +187,40 @@ class World:
         """Axes and middle of the pad, in the base of the arm."""
         return self.data.site_xmat[self.site].reshape(3, 3), self.data.site_xpos[self.site]
 
+    def placed(self):
+        """Axes and middle of the pad, in its axes at the start."""
+        axes, at = self.pad()
+        return self.axes0.T @ axes, self.axes0.T @ (at - self.at0)
+
+    def line(self):
+        """Angle of the object's line from y of the pad [degrees], and how far the middle is beside it [m]."""
+        axes, middle = self.placed()
+        _, across, angle = self.scene.line(middle[0], middle[1])
+        turned = math.degrees(angle - math.atan2(axes[1, 0], axes[0, 0]))
+        return turned % 180.0 - 90.0, across
+
     def touch(self, dt):
         axes, at = self.pad()
-        local, middle = self.axes0.T @ axes, self.axes0.T @ (at - self.at0)
+        local, middle = self.placed()
         points = middle[:, None] + local[:, :1] * self.foam.x + local[:, 1:2] * self.foam.y
         motion = np.zeros(6)
         mujoco.mj_objectVelocity(self.model, self.data, mujoco.mjtObj.mjOBJ_SITE, self.site, motion, 1)
         turn, speed = motion[:3], motion[3:]
         slide = np.array([speed[0] - turn[2] * self.foam.y, speed[1] + turn[2] * self.foam.x])
+        slide -= local[:2, :2].T @ np.array(np.broadcast_arrays(*self.scene.moves_with(points[0], points[1])))
         force, torque = self.foam.press(self.scene.depth(points), slide, dt)
         return axes @ force, axes @ torque, at.copy()
 
     def step(self, velocity):
         dt = DT / SUBSTEPS
+        while self.stiffer and self.stiffer[0][0] <= self.time:
+            self.foam.stiffen(self.stiffer.pop(0)[1])
         for _ in range(SUBSTEPS):
+            self.time += dt
+            self.scene.advance(self.time, dt)
             self.q_eq = self.q_eq + np.array(velocity) * dt
             force, torque, at = self.touch(dt)
-            applied = STIFFNESS * (self.q_eq - self.data.qpos) - self.damping * self.data.qvel
+            applied = self.springs * (self.q_eq - self.data.qpos) - self.damping * self.data.qvel
             mujoco.mj_applyFT(self.model, self.data, force, torque, at, self.body, applied)
             self.data.qfrc_applied[:] = applied
             mujoco.mj_step(self.model, self.data)
@@ -156,7 +230,7 @@ class World:
 
     def image(self, units):
         noisy = units * self.gains * (1.0 + self.random.normal(0.0, COMMON)) + self.random.normal(0.0, OWN, units.shape)
-        return np.clip(np.round(COUNTS * noisy), 0, 4095)
+        return self.faults.spoil(np.clip(np.round(COUNTS * noisy), 0, 4095), self.time)
 
 
 def hello(args):
@@ -184,10 +258,12 @@ def response(times, values, target, within):
     return float(times[near.argmax()] - times[0]) if near.any() else None
 
 
-def seen(rows):
+def seen(rows, change):
     """What a run shows from its first touch on: times in s, forces in N, pressures in units, places in tactels.
 
-    `lost` counts the frames without a contact from 0.1 s after the first touch on.
+    `lost` counts the frames without a contact from 0.1 s after the first touch on. With a change that begins and ends,
+    `before` is the force in the second before it, and `after` shows the same from its end on, with the times from there. `line` has mean and deviation of the
+    angle of the object's line [degrees] and the deviation of its distance [mm].
     """
     def number(value):
         return float(value) if math.isfinite(value) else None
@@ -197,7 +273,15 @@ def seen(rows):
     if not touched.any():
         return {"touched": None}
     rows = rows[touched.argmax():]
-    times, force, pressure, x, y, felt, felt_x, felt_y = rows.T
+    if change is None:
+        return figures(rows, number)
+    begin, end = np.searchsorted(rows[:, 0], change)
+    before = rows[max(0, begin - round(1.0 / DT)) : begin, 1].mean()
+    return {**figures(rows, number), "before": float(before), "after": figures(rows[end:], number)}
+
+
+def figures(rows, number):
+    times, force, pressure, x, y, felt, felt_x, felt_y, angle, across = rows.T
     last = slice(-round(5.0 / DT), None)
     mean = np.convolve(felt, np.ones(10) / 10, "valid")
     return {
@@ -207,6 +291,8 @@ def seen(rows):
         "error": [number(np.mean(felt[last]) - 1.0), number(np.mean(felt_x[last])), number(np.mean(felt_y[last]))],
         "deviation": [number(np.std(values[last])) for values in (felt, felt_x, felt_y)],
         "mean_deviation": number(np.std(mean[last])),
+        "line": [number(value) for value in (np.mean(angle[last]), np.std(angle[last]), 1e3 * np.std(across[last]))],
+        "true_error": [number(np.mean(value[last]) - target) for value, target in ((pressure, 1.0), (x, 0.0), (y, 0.0))],
         "true_rms": number(np.sqrt(np.mean((pressure[last] - 1.0) ** 2))),
     }
 
@@ -223,7 +309,7 @@ def serve(lines, args, world):
         units = world.foam.units()
         image = world.image(units)
         truth, felt = features(units, world.foam.centres), features(image / COUNTS, world.foam.centres)
-        rows.append([frame * DT, units.sum() * NEWTON, *truth, *felt])
+        rows.append([frame * DT, units.sum() * NEWTON, *truth, *felt, *world.line()])
         q, dq = world.data.qpos.tolist(), world.data.qvel.tolist()
         try:
             say({"type": "obs", "seq": frame, "t": frame * DT, "q": q, "dq": dq, "q_eq": world.q_eq.tolist(),
@@ -238,7 +324,7 @@ def serve(lines, args, world):
         world.step(answer["dq"])
     else:
         say({"type": "end"})
-    return {"frames": len(rows), "end": end, **seen(rows)}
+    return {"frames": len(rows), "end": end, **seen(rows, args.change)}
 
 
 def main():
@@ -250,6 +336,20 @@ def main():
     parser.add_argument("--radius", type=float, default=0.04, help="of ball or pen [m]")
     parser.add_argument("--size", type=float, nargs=2, default=[0.04, 0.03], help="of the box, along its axes [m]")
     parser.add_argument("--angle", type=float, default=0.0, help="from the sensor's x [rad]")
+    parser.add_argument("--bend", type=float, default=0.0, help="radius of the arc of a pen; 0 is straight [m]")
+    parser.add_argument("--move", type=float, nargs=4, default=[], action="append", metavar=("T", "X", "Y", "Z"),
+                        help="at a time [s], along the sensor's axes at the start [m]")
+    parser.add_argument("--speed", type=float, default=0.5, help="of the moves [m/s]")
+    parser.add_argument("--turn", type=float, default=0.0, help="rate of its angle [degrees/s]")
+    parser.add_argument("--turn-from", type=float, default=0.0, help="when it begins to turn [s]")
+    parser.add_argument("--stiffer", type=float, nargs=2, default=[], action="append", metavar=("T", "N_PER_M"),
+                        help="at a time [s], another stiffness of the object")
+    parser.add_argument("--joint-stiffness", type=float, default=200.0, help="of the arm [N m/rad]")
+    parser.add_argument("--dead", type=int, default=0, help="tactels that read zero")
+    parser.add_argument("--stuck", type=int, default=0, help="tactels that always read the same")
+    parser.add_argument("--repeat", type=float, default=0.0, help="share of frames that repeat the one before")
+    parser.add_argument("--garbage", type=float, default=[], action="append", help="time of a frame at its maximum [s]")
+    parser.add_argument("--change", type=float, nargs=2, help="when what is changed begins and ends [s]")
     parser.add_argument("--stiffness", type=float, default=1e6, help="of the object behind a tactel [N/m]")
     parser.add_argument("--seconds", type=float, default=10.0)
     parser.add_argument("--seed", type=int, default=1)

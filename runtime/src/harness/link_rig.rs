@@ -32,13 +32,14 @@ impl LinkRig {
         Ok(Self { attached, seen: Vec::new() })
     }
 
-    /// Waits for the next sample of a port. Returns `None` if none comes within `timeout`.
+    /// Waits for the next sample of a port that is not lost since. Returns `None` if none comes within `timeout`, or if
+    /// the port has no value in it.
     ///
     /// # Panics
     /// If the device has no such output of that kind.
     pub fn next<T: Signal>(&mut self, port: &str, timeout: Duration) -> Option<&T> {
         let seen = self.seen.iter().find(|(name, _)| name == port).map_or(0, |(_, seen)| *seen);
-        let is_there = self.wait_until(timeout, |rig| rig.attached.stamp(port).1 > seen);
+        let is_there = self.wait_until(timeout, |rig| rig.attached.stamp(port).1 > seen && rig.lost(port).is_none());
         let written = self.attached.stamp(port).1;
         self.seen.retain(|(name, _)| name != port);
         self.seen.push((port.to_owned(), written));

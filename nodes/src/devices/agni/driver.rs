@@ -35,6 +35,8 @@ pub(super) struct PadPort {
     pub(super) image: Output<Image>,
     /// The newest frame. It is kept here, so that a frame costs no allocation.
     cells: Vec<f32>,
+    /// The channels of the words of the frame before; empty before the first one.
+    channels: Vec<u8>,
     frames: u64,
     heard: Instant,
     clock: StampClock,
@@ -43,7 +45,8 @@ pub(super) struct PadPort {
 impl PadPort {
     pub(super) fn new(pad: Pad, image: Output<Image>) -> Self {
         let cells = vec![0.0; pad.layout.rows * pad.layout.cols];
-        Self { pad, image, cells, frames: 0, heard: Instant::now(), clock: StampClock::default() }
+        let (channels, clock) = (Vec::with_capacity(cells.len()), StampClock::default());
+        Self { pad, image, cells, channels, frames: 0, heard: Instant::now(), clock }
     }
 }
 
@@ -179,7 +182,8 @@ impl Agni {
                 Message::Frame(Frame { sensor, stamp, payload }) => {
                     let Some(at) = served.get(usize::from(sensor) - 1).copied().flatten() else { continue };
                     let pad = &mut pads[at];
-                    if !pad.pad.layout.read(payload, &mut pad.cells) {
+                    let layout = &pad.pad.layout;
+                    if !layout.keeps_channels(payload, &mut pad.channels) || !layout.read(payload, &mut pad.cells) {
                         link.count("bad frames");
                         continue;
                     }

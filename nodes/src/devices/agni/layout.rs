@@ -8,6 +8,8 @@ use tactflow_runtime::node::{Mistake, Param};
 const MAX_READING: f32 = 4095.0;
 /// The bits of a reading; the others are the channel of the converter.
 const READING: u16 = 0x0FFF;
+/// The bit of the high byte where the channel begins.
+const CHANNEL_BIT: u8 = 4;
 /// Largest number of tactels of a sensor: a payload has at most 65,535 bytes.
 const MAX_TACTELS: usize = 32_767;
 /// Largest number of tactels whose readings come with an id of one byte.
@@ -22,7 +24,8 @@ const GLOVE_SIDE: usize = 8;
 /// The form of a payload.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Param)]
 pub(super) enum Form {
-    /// A word of 16 bits for each tactel, little-endian.
+    /// A word of 16 bits for each tactel, little-endian: 12 bits of reading, and above them the channel of the converter,
+    /// which is the same in each frame.
     Words,
     /// The id of a tactel, one byte, and its word, for each tactel in any order.
     Pairs,
@@ -100,6 +103,23 @@ impl Layout {
     /// Returns the number of bytes of a payload.
     pub(super) fn bytes(&self) -> usize {
         self.tactels.len() * if self.form == Form::Pairs { 3 } else { 2 }
+    }
+
+    /// Puts the channel of each word of a payload into `channels`, in place of those of the frame before. Returns whether
+    /// they are the same. Pairs have ids instead.
+    ///
+    /// A word has the same channel in every frame. Where a byte is missing the words are mixed up, and a checksum of 8
+    /// bits does not see that in one frame of 256.
+    pub(super) fn keeps_channels(&self, payload: &[u8], channels: &mut Vec<u8>) -> bool {
+        if self.form == Form::Pairs {
+            return true;
+        }
+        let (words, _) = payload.as_chunks::<2>();
+        let found = words.iter().map(|[_, high]| high >> CHANNEL_BIT);
+        let is_same = channels.is_empty() || channels.iter().copied().eq(found.clone());
+        channels.clear();
+        channels.extend(found);
+        is_same
     }
 
     /// Reads a payload into `cells`. Returns whether it is one: it has the right length, and in pairs each tactel once.
@@ -211,6 +231,22 @@ mod tests {
             (vec![0, 1, 3], "the order has 3, but the numbers go from 0 to 2"),
         ] {
             assert_eq!(layout(Form::Words, Some(order)).unwrap_err().message, expected);
+        }
+    }
+
+    #[test]
+    fn a_frame_with_mixed_words_shows_by_its_channels() {
+        let (words, pairs) = (layout(Form::Words, None).unwrap(), layout(Form::Pairs, None).unwrap());
+        let mut channels = Vec::new();
+        for (payload, is_whole) in [
+            ([0x01, 0x02, 0x03, 0x14, 0x05, 0x26], true),
+            ([0xFF, 0x0F, 0x00, 0x10, 0xAB, 0x2C], true),
+            ([0xFF, 0x00, 0x10, 0xAB, 0x2C, 0xF0], false),
+            ([0xFF, 0x0F, 0x00, 0x10, 0xAB, 0x2C], false),
+            ([0x01, 0x02, 0x03, 0x14, 0x05, 0x26], true),
+        ] {
+            assert_eq!(words.keeps_channels(&payload, &mut channels), is_whole, "{payload:X?}");
+            assert!(pairs.keeps_channels(&payload, &mut channels));
         }
     }
 
