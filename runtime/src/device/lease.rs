@@ -268,13 +268,14 @@ mod tests {
             events in prop::collection::vec((0..30_i64, prop::option::of(prop::array::uniform2(-0.5..0.5_f64)), any::<bool>()), 1..120),
         ) {
             let (mut lease, mut commands, velocity) = lease();
-            let (mut now, mut epoch, mut graph, mut last, mut called) = (0, 1, [0.0; 2], [0.0; 2], 0);
+            let (mut now, mut epoch, mut graph, mut last) = (0, 1, [0.0; 2], [0.0; 2]);
+            let (mut called, mut granted) = (0, 0);
             for (ms, target, resumes) in events {
                 now += ms * MS;
                 epoch += u64::from(resumes);
                 if let Some(target) = target {
                     // The graph itself respects the accelerations between two of its commands.
-                    let dt = (now - commands.grant.since).min(4 * MS) as f64 * 1e-9;
+                    let dt = (now - std::mem::replace(&mut granted, now)).min(4 * MS) as f64 * 1e-9;
                     approach(&mut graph, |i| target[i], &[10.0; 2], dt);
                     grant(&mut commands, velocity, graph, epoch, now);
                 }
