@@ -31,7 +31,7 @@ MODEL = Path(__file__).resolve().parents[2] / "graphs/robots/lwr4p.urdf"
 # Inertia of the drives that remains under torque control [kg m²], and the friction of the joints [N m].
 DRIVES = [0.96, 0.92, 0.6, 0.62, 0.24, 0.12, 0.12]
 JOINT_FRICTION = 0.1
-DAMPING_RATIO = 0.2
+STIFFNESS, DAMPING_RATIO = 200.0, 0.2
 # The foam of a tactel [N/m, N/m³], where it stiffens [m], its creep, and the spread of a force over the tactels [m].
 FOAM, CUBIC, SOFT, CREEP, CREEP_S, SPREAD = 300.0, 8e7, 0.0025, 0.05, 1.5, 0.003
 # Coefficient of friction, and the stiffness of a bristle over that of the foam.
@@ -66,7 +66,7 @@ class Scene:
         """Velocity of the object along the axes at the start, at points of the pad [m/s]."""
         return self.velocity[0] - self.turn * (y - self.place[1]), self.velocity[1] + self.turn * (x - self.place[0])
 
-    def line(self, x, y):
+    def line_at(self, x, y):
         """Place along and across the object [m], and the angle of its line there."""
         x, y = x - self.place[0], y - self.place[1]
         sin, cos = math.sin(self.angle), math.cos(self.angle)
@@ -79,7 +79,7 @@ class Scene:
         return self.bend * turned, self.bend - np.hypot(along, beside), self.angle + turned
 
     def depth(self, points):
-        along, across, _ = self.line(points[0], points[1])
+        along, across, _ = self.line_at(points[0], points[1])
         x, y, z = (points[i] - self.place[i] for i in range(3))
         if self.kind == "ball":
             return self.radius - np.sqrt(x * x + y * y + (z - self.radius) ** 2)
@@ -140,10 +140,12 @@ class Foam:
 class Faults:
     """What is wrong with the pad: tactels that stay at zero or at a reading, and frames that are no measurement."""
 
-    def __init__(self, args, random):
-        cells = random.permutation(CELLS**2)
+    def __init__(self, args):
+        # The noise of a pad is the same with and without faults.
+        self.random = np.random.default_rng([args.seed, 2])
+        cells = self.random.permutation(CELLS**2)
         self.dead, self.stuck = cells[: args.dead], cells[args.dead : args.dead + args.stuck]
-        self.garbage, self.repeat, self.random, self.last = list(args.garbage), args.repeat, random, None
+        self.garbage, self.repeat, self.last = list(args.garbage), args.repeat, None
 
     def spoil(self, image, time):
         image.ravel()[self.dead], image.ravel()[self.stuck] = 0, 3000
@@ -160,7 +162,7 @@ class World:
     def __init__(self, args):
         self.scene, self.foam, self.random = Scene(args), Foam(args.stiffness), np.random.default_rng(args.seed)
         self.time, self.stiffer = 0.0, sorted(args.stiffer)
-        self.faults = Faults(args, self.random)
+        self.faults = Faults(args)
         spec = mujoco.MjSpec.from_file(str(MODEL))
         spec.option.timestep, spec.option.integrator = DT / SUBSTEPS, mujoco.mjtIntegrator.mjINT_IMPLICITFAST
         # The controller compensates the weight.
@@ -177,8 +179,7 @@ class World:
         self.site, self.body = self.model.site("pad").id, self.model.body("lwr_7_link").id
         inertia = np.zeros((len(NAMES), len(NAMES)))
         mujoco.mj_fullM(self.model, self.data, inertia)
-        self.springs = args.joint_stiffness
-        self.damping = 2.0 * DAMPING_RATIO * np.sqrt(self.springs * np.diag(inertia))
+        self.damping = 2.0 * DAMPING_RATIO * np.sqrt(STIFFNESS * np.diag(inertia))
         self.q_eq = np.array(START)
         self.axes0, self.at0 = (value.copy() for value in self.pad())
         self.gains = np.exp(self.random.normal(0.0, GAINS, (CELLS, CELLS)))
@@ -192,10 +193,10 @@ class World:
         axes, at = self.pad()
         return self.axes0.T @ axes, self.axes0.T @ (at - self.at0)
 
-    def line(self):
+    def line_seen(self):
         """Angle of the object's line from y of the pad [degrees], and how far the middle is beside it [m]."""
         axes, middle = self.placed()
-        _, across, angle = self.scene.line(middle[0], middle[1])
+        _, across, angle = self.scene.line_at(middle[0], middle[1])
         turned = math.degrees(angle - math.atan2(axes[1, 0], axes[0, 0]))
         return turned % 180.0 - 90.0, across
 
@@ -220,7 +221,7 @@ class World:
             self.scene.advance(self.time, dt)
             self.q_eq = self.q_eq + np.array(velocity) * dt
             force, torque, at = self.touch(dt)
-            applied = self.springs * (self.q_eq - self.data.qpos) - self.damping * self.data.qvel
+            applied = STIFFNESS * (self.q_eq - self.data.qpos) - self.damping * self.data.qvel
             mujoco.mj_applyFT(self.model, self.data, force, torque, at, self.body, applied)
             self.data.qfrc_applied[:] = applied
             mujoco.mj_step(self.model, self.data)
@@ -258,41 +259,49 @@ def response(times, values, target, within):
     return float(times[near.argmax()] - times[0]) if near.any() else None
 
 
+def number(value):
+    return float(value) if math.isfinite(value) else None
+
+
 def seen(rows, change):
-    """What a run shows from its first touch on: times in s, forces in N, pressures in units, places in tactels.
+    """What a run shows from its first touch on.
 
-    `lost` counts the frames without a contact from 0.1 s after the first touch on. With a change that begins and ends,
-    `before` is the force in the second before it, and `after` shows the same from its end on, with the times from there. `line` has mean and deviation of the
-    angle of the object's line [degrees] and the deviation of its distance [mm].
+    With a change that begins and ends, `before` is the mean force [N] in the second before it, and `after` are the
+    figures from its end on, with their times from there.
     """
-    def number(value):
-        return float(value) if math.isfinite(value) else None
-
     rows = np.array(rows)
     touched = rows[:, 1] > 0.05
     if not touched.any():
         return {"touched": None}
     rows = rows[touched.argmax():]
     if change is None:
-        return figures(rows, number)
+        return figures(rows)
     begin, end = np.searchsorted(rows[:, 0], change)
-    before = rows[max(0, begin - round(1.0 / DT)) : begin, 1].mean()
-    return {**figures(rows, number), "before": float(before), "after": figures(rows[end:], number)}
+    before, after = rows[max(0, begin - round(1.0 / DT)) : begin, 1], rows[end:]
+    return {**figures(rows), "before": number(before.mean()) if len(before) else None,
+            "after": figures(after) if len(after) else None}
 
 
-def figures(rows, number):
+def figures(rows):
+    """Times [s], forces [N], pressures [units] and places [tactels].
+
+    `lost` counts the frames without a contact, but not the first 25. `error` and `deviation` are of what the pad says
+    in the last 5 s, and `true_error` is of the truth. `line` has the mean and the deviation of the angle between the
+    object's line and y of the pad [degrees], and the deviation of its distance [mm].
+    """
     times, force, pressure, x, y, felt, felt_x, felt_y, angle, across = rows.T
     last = slice(-round(5.0 / DT), None)
     mean = np.convolve(felt, np.ones(10) / 10, "valid")
+    truth = ((pressure, 1.0), (x, 0.0), (y, 0.0))
     return {
         "touched": float(times[0]), "lost": int((force[25:] < 0.02).sum()), "most": float(force.max()),
-        "response": {name: response(times, values, target, within) for name, values, target, within in
-                     (("pressure", pressure, 1.0, 0.12), ("x", x, 0.0, 0.3), ("y", y, 0.0, 0.3))},
+        "response": {name: response(times, values, target, within) for name, (values, target), within in
+                     zip(("pressure", "x", "y"), truth, (0.12, 0.3, 0.3))},
         "error": [number(np.mean(felt[last]) - 1.0), number(np.mean(felt_x[last])), number(np.mean(felt_y[last]))],
         "deviation": [number(np.std(values[last])) for values in (felt, felt_x, felt_y)],
         "mean_deviation": number(np.std(mean[last])),
         "line": [number(value) for value in (np.mean(angle[last]), np.std(angle[last]), 1e3 * np.std(across[last]))],
-        "true_error": [number(np.mean(value[last]) - target) for value, target in ((pressure, 1.0), (x, 0.0), (y, 0.0))],
+        "true_error": [number(np.mean(values[last]) - target) for values, target in truth],
         "true_rms": number(np.sqrt(np.mean((pressure[last] - 1.0) ** 2))),
     }
 
@@ -309,7 +318,7 @@ def serve(lines, args, world):
         units = world.foam.units()
         image = world.image(units)
         truth, felt = features(units, world.foam.centres), features(image / COUNTS, world.foam.centres)
-        rows.append([frame * DT, units.sum() * NEWTON, *truth, *felt, *world.line()])
+        rows.append([frame * DT, units.sum() * NEWTON, *truth, *felt, *world.line_seen()])
         q, dq = world.data.qpos.tolist(), world.data.qvel.tolist()
         try:
             say({"type": "obs", "seq": frame, "t": frame * DT, "q": q, "dq": dq, "q_eq": world.q_eq.tolist(),
@@ -344,7 +353,6 @@ def main():
     parser.add_argument("--turn-from", type=float, default=0.0, help="when it begins to turn [s]")
     parser.add_argument("--stiffer", type=float, nargs=2, default=[], action="append", metavar=("T", "N_PER_M"),
                         help="at a time [s], another stiffness of the object")
-    parser.add_argument("--joint-stiffness", type=float, default=200.0, help="of the arm [N m/rad]")
     parser.add_argument("--dead", type=int, default=0, help="tactels that read zero")
     parser.add_argument("--stuck", type=int, default=0, help="tactels that always read the same")
     parser.add_argument("--repeat", type=float, default=0.0, help="share of frames that repeat the one before")

@@ -8,6 +8,7 @@ standard input say what goes wrong next:
     split     every byte is a write of its own       whole     a frame is one write
     mark      the data is full of headers            plain     the data is a ramp
     wrong     the next frame has a wrong checksum    lose      the next frame lacks a byte
+    mixed     the words of the next frame are one byte off, and its checksum is right
     extra     the next frame has a byte too many     garbage   text stands before the next frame
     fault     an error with a text is sent           silence   no frames are sent; `speak` ends it
     half      half a frame is sent, and the device is unplugged
@@ -149,6 +150,8 @@ class Device:
                 del frame[len(frame) // 2]
             elif self.next_fault == "extra":
                 frame.insert(len(frame) // 3, 0xF0)
+            elif self.next_fault == "mixed":
+                frame = bytearray(sealed(frame[2:7] + frame[8:-1] + frame[7:8]))
             elif self.next_fault == "garbage":
                 frame = bytearray(b"\xf0 1: start\r\n2: stop\xf0\xc4\xc9\r\n") + frame
             elif self.next_fault == "fault":

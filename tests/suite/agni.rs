@@ -108,6 +108,7 @@ fn whatever_happens_to_the_bytes_an_image_is_a_frame() {
     for (order, counter) in [
         ("wrong", "rejected frames"),
         ("lose", "resyncs"),
+        ("mixed", "bad frames"),
         ("extra", "resyncs"),
         ("garbage", "skipped bytes"),
         ("fault", "errors of the device"),

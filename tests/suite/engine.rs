@@ -30,7 +30,7 @@ struct Promise {
 }
 
 /// What happens to an object or to the pad, and what a task holds then: figures of the engine, and their largest
-/// magnitudes [s, N, units, tactels, degrees and mm].
+/// magnitudes. `figures` in `engine.py` says what they are, and in which units.
 struct Event {
     task: &'static str,
     scene: &'static str,
@@ -49,25 +49,25 @@ const EVENTS: [Event; 11] = [
         scene: "--scene box --stiffness 300 --stiffer 6 1500 --change 6 6",
         holds: &[("/lost", 0.0), ("/after/response/pressure", 0.5), ("/after/most", 13.0)],
     },
-    // Withdrawn for a second, and pushed back: it moves and is away for 1.4 s, 350 frames.
+    // Withdrawn at 6 s and pushed back at 7 s, with 75 mm/s. For 350 frames it is not where it was.
     Event {
         task: "force",
         scene: "--scene ball --stiffness 120 --move 6 0 0 0.03 --move 7 0 0 -0.03 --speed 0.075 --change 6 7.4",
-        holds: &[("/lost", 400.0), ("/after/response/pressure", 1.2), ("/after/most", 12.0)],
+        holds: &[("/lost", 400.0), ("/after/response/pressure", 1.2), ("/most", 12.0)],
     },
     Event {
         task: "position",
         scene: "--scene pen --radius 0.005 --size 0.05 0.05 --move 6 0 0 0.03 --move 7 0 0 -0.03 --speed 0.075 \
                 --change 6 7.4",
-        holds: &[("/lost", 450.0), ("/after/response/x", 2.3), ("/after/response/y", 1.8), ("/after/most", 14.0)],
+        holds: &[("/lost", 450.0), ("/after/response/x", 2.6), ("/after/response/y", 1.8), ("/most", 14.0)],
     },
     Event {
         task: "hybrid",
         scene: "--scene pen --radius 0.005 --size 0.05 0.05 --move 6 0 0 0.03 --move 7 0 0 -0.03 --speed 0.075 \
                 --change 6 7.4",
-        holds: &[("/lost", 480.0), ("/after/response/pressure", 3.2), ("/after/most", 14.0)],
+        holds: &[("/lost", 480.0), ("/after/response/pressure", 3.2), ("/most", 14.0)],
     },
-    // It moves sideways by 20 mm at once.
+    // It moves sideways by 20 mm in 40 ms.
     Event {
         task: "rolling",
         scene: "--scene ball --stiffness 120 --move 6 0.014 -0.014 0 --change 6 6.04",
@@ -82,24 +82,32 @@ const EVENTS: [Event; 11] = [
     Event {
         task: "edge",
         scene: "--scene edge --turn 6 --turn-from 4 --change 4 6",
-        holds: &[("/lost", 0.0), ("/after/line/0", 0.1), ("/after/line/1", 0.15)],
+        holds: &[("/lost", 0.0), ("/after/line/0", 0.15), ("/after/line/1", 0.15)],
     },
     Event {
         task: "edge",
         scene: "--scene pen --radius 0.003 --size 0.3 0.1 --turn 6 --turn-from 4 --change 4 6",
-        holds: &[("/lost", 0.0), ("/after/line/0", 0.1), ("/after/line/1", 0.15)],
+        holds: &[("/lost", 0.0), ("/after/line/0", 0.15), ("/after/line/1", 0.15)],
     },
-    // A cable that bends with a radius of 44 mm.
+    // A cable that bends with a radius of 44 mm. Gains of the tactels that differ by 5 % turn the line that is measured.
     Event {
         task: "cable",
         scene: "--scene pen --radius 0.003 --size 0.25 0.1 --bend 0.044 --change 3 3",
-        holds: &[("/after/lost", 0.0), ("/after/line/0", 0.6), ("/after/line/1", 0.25), ("/after/line/2", 0.15)],
+        holds: &[("/after/lost", 0.0), ("/after/line/0", 3.0), ("/after/line/1", 0.5), ("/after/line/2", 0.15)],
     },
     // A pad with faults, and one frame of garbage.
     Event {
         task: "hybrid",
         scene: "--scene ball --stiffness 120 --dead 3 --stuck 1 --repeat 0.02 --garbage 7 --change 7 7",
-        holds: &[("/lost", 0.0), ("/true_error/0", 0.1), ("/true_error/1", 0.1), ("/true_error/2", 0.1)],
+        holds: &[
+            ("/lost", 0.0),
+            ("/after/most", 5.0),
+            ("/after/response/x", 0.1),
+            ("/after/response/y", 0.1),
+            ("/true_error/0", 0.1),
+            ("/true_error/1", 0.1),
+            ("/true_error/2", 0.1),
+        ],
     },
 ];
 
@@ -117,7 +125,7 @@ const PROMISES: [Promise; 4] = [
     },
     Promise {
         task: "hybrid",
-        response_s: [[1.3, 1.0, 1.0], [1.3, 1.3, 1.0], [1.5, 1.4, 1.3]],
+        response_s: [[1.4, 1.0, 1.0], [1.5, 1.3, 1.0], [1.6, 1.4, 1.5]],
         error: [0.016, 0.05, 0.06],
     },
     Promise {
@@ -131,28 +139,28 @@ const PROMISES: [Promise; 4] = [
 fn broken(seen: &Value, promise: &Promise, object: usize) -> Vec<String> {
     let mut wrong = Vec::new();
     // A frame lasts 4 ms. Rolling meets a corner of the box first, and may leave it for a moment.
-    if number(&seen["lost"]) > if promise.task == "rolling" { 25.0 } else { 0.0 } {
+    if figure(&seen["lost"]) > if promise.task == "rolling" { 25.0 } else { 0.0 } {
         wrong.push(format!("it left the object for {} frames", seen["lost"]));
     }
     for (i, name) in FEATURES.into_iter().enumerate() {
-        let response = number(&seen["response"][name]);
+        let response = figure(&seen["response"][name]);
         if response > promise.response_s[object][i] {
             wrong.push(format!("{name} took {response} s"));
         }
-        let error = number(&seen["error"][i]).abs();
+        let error = figure(&seen["error"][i]).abs();
         if error > promise.error[i] {
             wrong.push(format!("{name} is {error} off"));
         }
     }
     // The noise of the pad alone is 0.04.
-    if promise.error[0] < ANY && number(&seen["deviation"][0]) > 0.046 {
+    if promise.error[0] < ANY && figure(&seen["deviation"][0]) > 0.046 {
         wrong.push(format!("the pressure deviates by {}", seen["deviation"][0]));
     }
     wrong
 }
 
 /// A figure of the engine. What was not measured holds no bound.
-fn number(value: &Value) -> f64 {
+fn figure(value: &Value) -> f64 {
     value.as_f64().unwrap_or(f64::MAX)
 }
 
@@ -189,7 +197,7 @@ fn the_tasks_of_the_paper_hold_on_a_physics_engine() {
 fn the_tasks_bear_what_happens_to_objects_and_pad_on_a_physics_engine() {
     let mut wrong = String::new();
     for Event { task, scene, holds } in &EVENTS {
-        // A cable lies as it is tracked, and an edge is turned by 35 to 55 degrees at first.
+        // A cable is 10 and 7 degrees from y of the pad at first, and an edge 38 and 44.
         let angles = match *task {
             "cable" => [-1.4, -1.7],
             "edge" => [0.9, -0.8],
@@ -199,8 +207,8 @@ fn the_tasks_bear_what_happens_to_objects_and_pad_on_a_physics_engine() {
             angles.into_iter().zip(["--offset 0.006 -0.004 --seed 5", "--offset -0.005 0.005 --seed 6"])
         {
             let (seen, failure) = run(task, &format!("{scene} {place} --angle {angle} --seconds 11"));
-            let figure = |path: &str| seen.pointer(path).map_or(f64::MAX, number);
-            let wrongs: Vec<_> = holds.iter().filter(|(path, most)| figure(path).abs() > *most).collect();
+            let at = |path: &str| seen.pointer(path).map_or(f64::MAX, figure);
+            let wrongs: Vec<_> = holds.iter().filter(|(path, most)| at(path).abs() > *most).collect();
             if !failure.is_empty() || !wrongs.is_empty() {
                 writeln!(wrong, "{task} on {scene} {place}: {wrongs:?} {failure}\n{seen}").unwrap();
             }

@@ -98,7 +98,7 @@ struct Numbering {
 impl Live for Numbering {
     async fn run(self: Box<Self>, mut link: Link) -> Result<(), DeviceError> {
         for number in 0.. {
-            let (stamp, answered) = (link.arrival(), link.answers().map_or(-1.0, |number| number as f64));
+            let (stamp, answered) = (link.arrival(), link.commands().answers().map_or(-1.0, |number| number as f64));
             link.publish(|samples| {
                 *samples.write(self.number, stamp, number) = number as f64;
                 *samples.write(self.answered, stamp, number) = answered;

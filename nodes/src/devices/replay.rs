@@ -32,8 +32,8 @@ pub struct Params {
 /// The arm reports the joints that it had. It takes commands and follows none: the loop is open, and a run says so at
 /// its start. A sample comes in the tick in which it came to the recorded run, and keeps its stamp; so in virtual time
 /// the recorded graph computes the same values again, to the last bit. What has lost or failed then, does so again.
-/// Words of the operator, changed parameters, lost leases and late ticks belong to the run and not to the device, so
-/// they are not repeated; `tactflow replay` repeats everything.
+/// Words of the operator, changed parameters, lost leases and ticks without a sample, as on a busy machine, belong to the
+/// run and not to the device, so they are not repeated; `tactflow replay` repeats everything.
 ///
 /// A run ends with the recording. A recording that was cut is played up to the cut. One that has lost inputs is refused.
 ///

@@ -153,7 +153,7 @@ impl Samples {
     }
 }
 
-/// For how long commands are valid.
+/// For how long commands are valid, and which sample they answer.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub(crate) struct Grant {
     /// It grows when the operator resumes after a lost lease.
@@ -168,7 +168,7 @@ pub(crate) struct Grant {
 #[derive(Debug, Clone, Default)]
 pub struct Commands {
     pub(crate) values: Vec<Box<[f64]>>,
-    /// For how long a live device may follow them.
+    /// For how long a live device may follow them, and which of its samples they answer.
     pub(crate) grant: Grant,
     arenas: Arenas,
     reports: Vec<ReportValue>,
@@ -223,6 +223,15 @@ impl Commands {
     #[must_use]
     pub fn joints(&self, port: Command) -> &[f64] {
         &self.values[port.0]
+    }
+
+    /// Returns which sample of the device these commands answer: the sequence number that was
+    /// [written](Samples::write) last among the samples that they were computed from. `None` if there was none.
+    ///
+    /// It names one sample only if all ports of the device share one sequence.
+    #[must_use]
+    pub const fn answers(&self) -> Option<u64> {
+        self.grant.seen
     }
 
     /// Sets the command of a port, as a graph does.

@@ -96,6 +96,7 @@ impl Lease {
     /// Returns what the device may do at `now` [ns].
     pub(crate) fn hold(&mut self, granted: &Commands, now: i64) -> &Commands {
         let Grant { epoch, until, .. } = granted.grant;
+        self.held.grant = granted.grant;
         let last = std::mem::replace(&mut self.at, now);
         let was_refused = self.shared.refuses(epoch);
         let has_stopped = now.saturating_sub(last) > self.silence && !self.held.are_zero();

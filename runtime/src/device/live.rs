@@ -163,12 +163,6 @@ impl Link {
         self.mute.load(Ordering::Acquire)
     }
 
-    /// Returns which sample the newest commands answer: the sequence number that was [written](Samples::write) last among
-    /// those that they were computed from. `None` before there is such a sample.
-    pub fn answers(&mut self) -> Option<u64> {
-        self.commands.read().grant.seen
-    }
-
     /// Waits for the next commands, for a period of the device and a quarter of its
     /// [`on_silence`](Description::on_silence) at most: then those that hold may have changed by themselves. The future
     /// does not borrow the link.
@@ -263,7 +257,8 @@ pub(crate) fn start(name: &str, driver: Box<dyn Live>, setup: LinkSetup<'_>) -> 
     let (published, commanded) = (Arc::new(AtomicU64::new(samples.writes)), Arc::new(Notify::new()));
     let [finished, is_final, mute] = [false, false, is_mute].map(|is_so| Arc::new(AtomicBool::new(is_so)));
     let link = Link {
-        staging: samples.clone(),
+        // A driver that is started again answers no sample of the one before it.
+        staging: Samples { newest: None, ..samples.clone() },
         samples: samples_in,
         commands: commands_out,
         lease,

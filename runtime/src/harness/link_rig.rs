@@ -32,8 +32,8 @@ impl LinkRig {
         Ok(Self { attached, seen: Vec::new() })
     }
 
-    /// Waits for the next sample of a port that is not lost since. Returns `None` if none comes within `timeout`, or if
-    /// the port has no value in it.
+    /// Waits for the next sample of a port, and skips samples after which the port was lost. Returns `None` if none comes
+    /// within `timeout`, or if it has no value.
     ///
     /// # Panics
     /// If the device has no such output of that kind.

@@ -8,6 +8,7 @@ use tactflow_runtime::device::{DeviceError, Link, Live, Output};
 use tactflow_runtime::signal::Image;
 use tokio::time::Instant;
 
+use super::layout::Channels;
 use super::messages::{Frame, Message};
 use super::port::BAUD;
 use super::sensors::{Pad, assign};
@@ -35,9 +36,10 @@ pub(super) struct PadPort {
     pub(super) image: Output<Image>,
     /// The newest frame. It is kept here, so that a frame costs no allocation.
     cells: Vec<f32>,
-    /// The channels of the words of the frame before; empty before the first one.
-    channels: Vec<u8>,
+    channels: Channels,
     frames: u64,
+    /// Number of frames since `heard` that are none of its layout.
+    bad: u64,
     heard: Instant,
     clock: StampClock,
 }
@@ -45,8 +47,8 @@ pub(super) struct PadPort {
 impl PadPort {
     pub(super) fn new(pad: Pad, image: Output<Image>) -> Self {
         let cells = vec![0.0; pad.layout.rows * pad.layout.cols];
-        let (channels, clock) = (Vec::with_capacity(cells.len()), StampClock::default());
-        Self { pad, image, cells, channels, frames: 0, heard: Instant::now(), clock }
+        let (channels, clock) = (Channels::default(), StampClock::default());
+        Self { pad, image, cells, channels, frames: 0, bad: 0, heard: Instant::now(), clock }
     }
 }
 
@@ -158,7 +160,7 @@ impl Agni {
         session.start(used, self.period).await?;
         let now = Instant::now();
         for pad in &mut self.pads {
-            (pad.heard, pad.clock) = (now, StampClock::default());
+            (pad.heard, pad.bad, pad.clock) = (now, 0, StampClock::default());
         }
         loop {
             self.publish(link, &served);
@@ -182,8 +184,8 @@ impl Agni {
                 Message::Frame(Frame { sensor, stamp, payload }) => {
                     let Some(at) = served.get(usize::from(sensor) - 1).copied().flatten() else { continue };
                     let pad = &mut pads[at];
-                    let layout = &pad.pad.layout;
-                    if !layout.keeps_channels(payload, &mut pad.channels) || !layout.read(payload, &mut pad.cells) {
+                    if !pad.pad.layout.read(payload, &mut pad.channels, &mut pad.cells) {
+                        pad.bad += 1;
                         link.count("bad frames");
                         continue;
                     }
@@ -192,7 +194,7 @@ impl Agni {
                         Some(unit) => link.stamp_of((ticks as f64 * unit).round() as i64),
                         None => link.arrival(),
                     };
-                    (pad.frames, pad.heard) = (pad.frames + 1, Instant::now());
+                    (pad.frames, pad.bad, pad.heard) = (pad.frames + 1, 0, Instant::now());
                     let (image, number, cells) = (pad.image, pad.frames, &pad.cells);
                     link.publish(|samples| {
                         samples.count("frames");
@@ -219,8 +221,13 @@ impl Agni {
     fn silent(&mut self) -> String {
         let fault = self.session.as_mut().and_then(|session| session.fault.take());
         let fault = fault.map_or_else(String::new, |fault| format!("; the device reports {fault}"));
-        let oldest = self.pads.iter().min_by_key(|pad| pad.heard).and_then(|pad| pad.pad.side.as_deref());
-        let of = oldest.map_or_else(String::new, |side| format!(" of `{side}`"));
-        format!("no frame{of} for {:?}{fault}", self.silence)
+        let oldest = self.pads.iter().min_by_key(|pad| pad.heard);
+        let of =
+            oldest.and_then(|pad| pad.pad.side.as_deref()).map_or_else(String::new, |side| format!(" of `{side}`"));
+        let bad = match oldest.map_or(0, |pad| pad.bad) {
+            0 => String::new(),
+            count => format!("; {count} frames do not fit its layout, or have other channels than the frames before"),
+        };
+        format!("no frame{of} for {:?}{bad}{fault}", self.silence)
     }
 }

@@ -24,8 +24,8 @@ const GLOVE_SIDE: usize = 8;
 /// The form of a payload.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Param)]
 pub(super) enum Form {
-    /// A word of 16 bits for each tactel, little-endian: 12 bits of reading, and above them the channel of the converter,
-    /// which is the same in each frame.
+    /// A word of 16 bits for each tactel, little-endian: 12 bits of reading, and above them 4 bits that are the same in
+    /// each frame, such as the channel of the converter.
     Words,
     /// The id of a tactel, one byte, and its word, for each tactel in any order.
     Pairs,
@@ -105,26 +105,13 @@ impl Layout {
         self.tactels.len() * if self.form == Form::Pairs { 3 } else { 2 }
     }
 
-    /// Puts the channel of each word of a payload into `channels`, in place of those of the frame before. Returns whether
-    /// they are the same. Pairs have ids instead.
-    ///
-    /// A word has the same channel in every frame. Where a byte is missing the words are mixed up, and a checksum of 8
-    /// bits does not see that in one frame of 256.
-    pub(super) fn keeps_channels(&self, payload: &[u8], channels: &mut Vec<u8>) -> bool {
-        if self.form == Form::Pairs {
-            return true;
-        }
-        let (words, _) = payload.as_chunks::<2>();
-        let found = words.iter().map(|[_, high]| high >> CHANNEL_BIT);
-        let is_same = channels.is_empty() || channels.iter().copied().eq(found.clone());
-        channels.clear();
-        channels.extend(found);
-        is_same
-    }
-
-    /// Reads a payload into `cells`. Returns whether it is one: it has the right length, and in pairs each tactel once.
-    pub(super) fn read(&self, payload: &[u8], cells: &mut [f32]) -> bool {
+    /// Reads a payload into `cells`. Returns whether it is one: it has the right length, each word has its channel, and in
+    /// pairs each tactel stands once.
+    pub(super) fn read(&self, payload: &[u8], channels: &mut Channels, cells: &mut [f32]) -> bool {
         if payload.len() != self.bytes() || cells.len() != self.tactels.len() {
+            return false;
+        }
+        if self.form == Form::Words && !channels.are_those_of(payload) {
             return false;
         }
         let value = |low, high| 1.0 - f32::from(u16::from_le_bytes([low, high]) & READING) / MAX_READING;
@@ -146,6 +133,34 @@ impl Layout {
                 })
             }
         }
+    }
+}
+
+/// The channels of the words of a sensor, as its frames have shown them.
+///
+/// A word has the same channel in every frame. Where a byte is missing, the words are mixed up, and a checksum of 8 bits
+/// does not see that in one frame of 256. Two frames in a row with the same other channels are believed.
+#[derive(Debug, Default)]
+pub(super) struct Channels {
+    known: Vec<u8>,
+    /// Those of the last frame that had others.
+    others: Vec<u8>,
+}
+
+impl Channels {
+    fn are_those_of(&mut self, payload: &[u8]) -> bool {
+        let (words, _) = payload.as_chunks::<2>();
+        let found = words.iter().map(|[_, high]| high >> CHANNEL_BIT);
+        if self.known.is_empty() || self.others.iter().copied().eq(found.clone()) {
+            self.known.clear();
+            self.known.extend(found.clone());
+        }
+        self.others.clear();
+        let are_known = self.known.iter().copied().eq(found.clone());
+        if !are_known {
+            self.others.extend(found);
+        }
+        are_known
     }
 }
 
@@ -196,7 +211,7 @@ mod tests {
             let mut payload = vec![0xFF; 512];
             payload[2 * word..2 * word + 2].copy_from_slice(&[0x00, 0xA0]);
             let mut cells = vec![-1.0; 256];
-            assert!(layout.read(&payload, &mut cells));
+            assert!(layout.read(&payload, &mut Channels::default(), &mut cells));
             let pressed: Vec<usize> = (0..256).filter(|i| cells[*i] == 1.0).collect();
             assert_eq!(pressed, [16 * row + col], "word {word}");
             assert!(cells.iter().all(|cell| [0.0, 1.0].contains(cell)), "the channel is not part of the reading");
@@ -207,19 +222,22 @@ mod tests {
     fn readings_fall_with_the_force() {
         let layout = layout(Form::Words, None).unwrap();
         let mut cells = [0.0; 3];
-        assert!(layout.read(&[0xFF, 0x0F, 0x00, 0x00, 0x00, 0x04], &mut cells));
+        assert!(layout.read(&[0xFF, 0x0F, 0x00, 0x00, 0x00, 0x04], &mut Channels::default(), &mut cells));
         assert_eq!(cells, [0.0, 1.0, 1.0 - 1024.0 / 4095.0]);
-        assert!(!layout.read(&[0; 5], &mut cells));
+        assert!(!layout.read(&[0; 5], &mut Channels::default(), &mut cells));
     }
 
     #[test]
     fn a_glove_sends_each_tactel_once_in_any_order() {
         let layout = layout(Form::Pairs, Some(vec![2, 0, 1])).unwrap();
         let mut cells = [0.0; 3];
-        assert!(layout.read(&[1, 0xFF, 0x0F, 2, 0x00, 0x00, 0, 0x00, 0x04], &mut cells));
+        assert!(layout.read(&[1, 0xFF, 0x0F, 2, 0x00, 0x00, 0, 0x00, 0x04], &mut Channels::default(), &mut cells));
         assert_eq!(cells, [1.0, 1.0 - 1024.0 / 4095.0, 0.0]);
-        assert!(!layout.read(&[1, 0, 0, 1, 0, 0, 0, 0, 0], &mut cells), "one twice");
-        assert!(!layout.read(&[1, 0, 0, 3, 0, 0, 0, 0, 0], &mut cells), "one that is not there");
+        assert!(!layout.read(&[1, 0, 0, 1, 0, 0, 0, 0, 0], &mut Channels::default(), &mut cells), "one twice");
+        assert!(
+            !layout.read(&[1, 0, 0, 3, 0, 0, 0, 0, 0], &mut Channels::default(), &mut cells),
+            "one that is not there"
+        );
         assert_eq!(Layout::builtin("glove").unwrap().bytes(), 192);
     }
 
@@ -236,17 +254,19 @@ mod tests {
 
     #[test]
     fn a_frame_with_mixed_words_shows_by_its_channels() {
-        let (words, pairs) = (layout(Form::Words, None).unwrap(), layout(Form::Pairs, None).unwrap());
-        let mut channels = Vec::new();
+        let (layout, mut channels, mut cells) = (layout(Form::Words, None).unwrap(), Channels::default(), [0.0; 3]);
         for (payload, is_whole) in [
-            ([0x01, 0x02, 0x03, 0x14, 0x05, 0x26], true),
-            ([0xFF, 0x0F, 0x00, 0x10, 0xAB, 0x2C], true),
-            ([0xFF, 0x00, 0x10, 0xAB, 0x2C, 0xF0], false),
-            ([0xFF, 0x0F, 0x00, 0x10, 0xAB, 0x2C], false),
-            ([0x01, 0x02, 0x03, 0x14, 0x05, 0x26], true),
+            (&[0x01, 0x02, 0x03, 0x14, 0x05, 0x26][..], true),
+            (&[0xFF, 0x0F, 0x00, 0x10, 0xAB, 0x2C], true),
+            (&[0xFF, 0x00, 0x10, 0xAB, 0x2C, 0xF0], false),
+            (&[0x01, 0x02, 0x03, 0x14], false),
+            (&[0xFF, 0x0F, 0x00, 0x10, 0xAB, 0x2C], true),
+            // Mixed up for good: another sensor, or the first frame was the wrong one.
+            (&[0xFF, 0x30, 0x10, 0x4B, 0x2C, 0x50], false),
+            (&[0xFF, 0x31, 0x10, 0x42, 0x2C, 0x53], true),
+            (&[0xFF, 0x0F, 0x00, 0x10, 0xAB, 0x2C], false),
         ] {
-            assert_eq!(words.keeps_channels(&payload, &mut channels), is_whole, "{payload:X?}");
-            assert!(pairs.keeps_channels(&payload, &mut channels));
+            assert_eq!(layout.read(payload, &mut channels, &mut cells), is_whole, "{payload:X?}");
         }
     }
 
@@ -255,7 +275,7 @@ mod tests {
         fn any_payload_is_read_without_a_panic(payload: Vec<u8>, is_pairs: bool) {
             let layout = layout(if is_pairs { Form::Pairs } else { Form::Words }, None).unwrap();
             let mut cells = [0.0; 3];
-            layout.read(&payload, &mut cells);
+            layout.read(&payload, &mut Channels::default(), &mut cells);
             prop_assert!(cells.iter().all(|cell| (0.0..=1.0).contains(cell)));
         }
     }

@@ -4,6 +4,7 @@ use tactflow_runtime::node::Mistakes;
 
 use super::Params;
 use super::driver::StampClock;
+use super::layout::Channels;
 use super::messages::{Message, Messages};
 use super::sensors::{assign, pads};
 
@@ -15,6 +16,7 @@ pub(crate) fn listen(params: &Params) -> Result<impl Fn(&[&[u8]]) -> Vec<String>
         let mut messages = Messages::default();
         let mut served = Vec::new();
         let mut clock = StampClock::default();
+        let mut channels: Vec<Channels> = pads.iter().map(|_| Channels::default()).collect();
         let mut cells: Vec<Vec<f32>> = pads.iter().map(|pad| vec![0.0; pad.layout.rows * pad.layout.cols]).collect();
         for piece in pieces {
             messages.push(piece);
@@ -24,7 +26,9 @@ pub(crate) fn listen(params: &Params) -> Result<impl Fn(&[&[u8]]) -> Vec<String>
                     Some(Message::Config(config)) => config,
                     Some(Message::Frame(frame)) => {
                         let at = served.get(usize::from(frame.sensor) - 1).copied().flatten();
-                        let image = at.filter(|at: &usize| pads[*at].layout.read(frame.payload, &mut cells[*at]));
+                        let image = at.filter(|at: &usize| {
+                            pads[*at].layout.read(frame.payload, &mut channels[*at], &mut cells[*at])
+                        });
                         let image = image.map(|at| &cells[at]);
                         heard.push(format!("frame {} {} {image:?}", frame.sensor, clock.ticks(frame.stamp)));
                         continue;

@@ -99,11 +99,12 @@ pub struct Params {
 ///
 /// Several sensors on one device are several pads, each with a `side`, and a bench binds `left_pad = "skin.left"`.
 ///
-/// A frame with a wrong checksum is dropped, and so is one whose words have other channels than in the frame before.
-/// After bytes that are no frame, the next frame only shows where frames begin, and is not used. When the port is gone,
-/// or no frame comes for `silence_ms`, the pads are lost, and the device connects again. A device with another serial
-/// number ends the run: nothing is known of its zeros. It counts `frames`, `rejected frames`, `resyncs`,
-/// `skipped bytes`, `bad frames`, `errors of the device` and `reconnects`. At the end of a run it stops the sensors.
+/// A frame with a wrong checksum is dropped, and so is one whose words have other channels than those before, unless a
+/// second one in a row has them too (that they stay the same has not been seen on a sensor). After bytes that are no
+/// frame, the next frame only shows where frames begin, and is not used. When the port is gone, or no frame comes for
+/// `silence_ms`, the pads are lost, and the device connects again. A device with another serial number ends the run:
+/// nothing is known of its zeros. It counts `frames`, `rejected frames`, `resyncs`, `skipped bytes`, `bad frames`,
+/// `errors of the device` and `reconnects`. At the end of a run it stops the sensors.
 ///
 /// The unit of the stamps is not documented. With `stamp_unit_ms`, the age of a frame is computed from them. It states
 /// the facts `dead`, `threshold`, `pressure`, `calibration`, `mount`, `rest_frames` and `tare_bound`.

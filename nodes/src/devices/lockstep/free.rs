@@ -183,9 +183,8 @@ impl Session {
     /// Sends the command that holds now, if it answers a frame, differs from the last one, or keeps the simulator from
     /// its timeout.
     fn send(&mut self, link: &mut Link) {
-        let seq = link.answers();
         let commands = link.commands();
-        let dq = commands.joints(self.arm.velocity);
+        let (seq, dq) = (commands.answers(), commands.joints(self.arm.velocity));
         let is_due = self.answered != seq || self.sent != dq || self.sent_at.elapsed() >= KEEP_ALIVE;
         let Some(seq) = seq.filter(|_| is_due) else { return };
         let est = commands.report(self.arm.contact).map(|pose| pose.0.translation.vector.into());
