@@ -190,6 +190,7 @@ struct Flaky {
 #[async_trait::async_trait]
 impl Live for Flaky {
     async fn run(self: Box<Self>, mut link: Link) -> Result<(), DeviceError> {
+        assert_eq!(link.commands().answers(), None, "it has not sampled yet");
         for number in 0.. {
             if self.attempt < 2 && number == 5 {
                 if self.ends {

@@ -5,7 +5,6 @@ use std::process::{Command, Stdio};
 use tactflow_tests::workspace;
 
 /// What the tool said, and its exit code.
-#[derive(Debug)]
 pub(crate) struct Said {
     pub(crate) code: i32,
     pub(crate) out: String,

@@ -245,8 +245,12 @@ pub(crate) struct LinkSetup<'a> {
 /// If the operating system gives no thread.
 pub(crate) fn start(name: &str, driver: Box<dyn Live>, setup: LinkSetup<'_>) -> io::Result<Linked> {
     let LinkSetup { description, samples, commands, accelerations, epoch, is_mute } = setup;
-    let (samples_in, samples_out) = TripleBuffer::new(samples).split();
-    let (commands_in, commands_out) = TripleBuffer::new(commands).split();
+    // A driver that is started again answers no sample of the one before it.
+    let samples = Samples { newest: None, ..samples.clone() };
+    let mut commands = commands.clone();
+    commands.grant.seen = None;
+    let (samples_in, samples_out) = TripleBuffer::new(&samples).split();
+    let (commands_in, commands_out) = TripleBuffer::new(&commands).split();
     let (stop, stopping) = watch::channel(String::new());
     let period = Duration::from_secs_f64(description.period);
     // A device must not take the time between two samples for silence.
@@ -257,8 +261,7 @@ pub(crate) fn start(name: &str, driver: Box<dyn Live>, setup: LinkSetup<'_>) -> 
     let (published, commanded) = (Arc::new(AtomicU64::new(samples.writes)), Arc::new(Notify::new()));
     let [finished, is_final, mute] = [false, false, is_mute].map(|is_so| Arc::new(AtomicBool::new(is_so)));
     let link = Link {
-        // A driver that is started again answers no sample of the one before it.
-        staging: Samples { newest: None, ..samples.clone() },
+        staging: samples,
         samples: samples_in,
         commands: commands_out,
         lease,
