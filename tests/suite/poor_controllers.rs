@@ -168,6 +168,12 @@ fn poor_modes() -> Vec<(&'static str, Variant)> {
         ("unforced-rolling", variant("explore", &["select = [1, 1, 0, 1, 1, 1]"])),
         ("line-position", variant("cable", &["select = [1, 1, 1, 0, 0, 1]"])),
         ("line-position", on("bent_cable", variant("cable", &["select = [1, 1, 1, 1, 0, 1]"]))),
+        ("chattering-modes", variant("position", &["set modes.servo.go.below=0.06"])),
+        ("chattering-modes", variant("position", &["set modes.servo.go.below=0.05", "set modes.servo.go.for_ms=100"])),
+        (
+            "chattering-modes",
+            variant("position", &["set modes.press.go.above=0.03", "set modes.press.go.hysteresis=0.01"]),
+        ),
         ("fast-recovery", searching("hybrid")),
         ("fast-recovery", searching("edge")),
     ]
@@ -260,6 +266,9 @@ fn good() -> Vec<Variant> {
         variant("cable", &["select = [1, 0, 1, 0, 1, 1]"]),
         variant("edge", &["select = [1, 1, 1, 1, 1, 1]"]),
         variant("rolling", &["select = [0, 0, 1, 1, 1, 0]"]),
+        // Modes that lead to each other with a gap, or after a while.
+        variant("position", &["set modes.servo.go.below=0.04"]),
+        variant("position", &["set modes.servo.go.below=0.08", "set modes.servo.go.for_ms=1000"]),
         // Filters, derivatives and integrals as they should be.
         variant("hybrid", &["time_constant_ms = 200"]),
         variant("hybrid", &["time_constant_ms = 20"]),

@@ -190,6 +190,7 @@ fn check_modes(
     check::motion::check(net, &contact, &modes, &generators, diagnostics);
     check::late::check(&modes, period, diagnostics);
     check::immediate::check(net, &modes, period, diagnostics);
+    check::chatter::check(net, &contact, &modes, period, diagnostics);
     let starts = check::reachability::check(net, diagnostics);
     check::approach::check(net, &contact, &modes, &starts, (&motions, &generators), diagnostics);
     (modes, starts)

@@ -158,6 +158,8 @@ codes! {
     LateExit "late-exit",
     /// An exit of a mode that holds as soon as the mode begins.
     ImmediateExit "immediate-exit",
+    /// Two modes that lead to each other again and again.
+    ChatteringModes "chattering-modes",
     /// An entry of [allow] that silences no warning.
     UnusedAllow "unused-allow",
 }
@@ -207,6 +209,7 @@ impl Code {
             | Self::NoApproach
             | Self::LateExit
             | Self::ImmediateExit
+            | Self::ChatteringModes
             | Self::UnusedAllow => Severity::Warning,
             _ => Severity::Error,
         }

@@ -9,6 +9,7 @@ use tactflow_runtime::graph::{Outline, OutlinedMode, Request, compile};
 use tactflow_runtime::record::PortColumns;
 
 use super::lift;
+use super::stay::Stay;
 use crate::motion::COMPONENTS;
 use crate::tool::control::law::Feature;
 use crate::tool::control::shape::turn;
@@ -157,6 +158,11 @@ pub(super) fn long_enough(outline: &Outline, seconds: f64) -> impl Iterator<Item
     limited.map(move |device| format!("devices.{}.for_s={seconds:?}", device.name))
 }
 
+/// Returns the number of ticks of `period` [s] in which a contact settles before it is measured.
+pub(super) fn settling(period: f64) -> usize {
+    Sine::all(period).first().map_or(0, |sine| sine.begin)
+}
+
 /// Returns how long the mode is measured, for ticks of `period` [s].
 pub(super) fn measured(period: f64) -> f64 {
     Sine::all(period).last().map_or(0.0, |sine| sine.end() as f64 * period)
@@ -184,20 +190,15 @@ impl Experiment<'_> {
         let all = find(&engine, format!("{}.twist.{}", self.adder, COMPONENTS[self.component]))?;
         let sines = Sine::all(self.period);
         let wanted = sines.last().map_or(0, Sine::end);
-        let (mut rows, mut left): (Vec<[f64; 2]>, Option<String>) = (Vec::new(), None);
+        let mut stay = Stay::new(&self.mode.name, settling(self.period), wanted);
         let options = RunOptions { duration: Some(duration(self.period)), ..RunOptions::default() };
         let column = self.feature.column[self.component];
         let outcome = run(&mut engine, &options, &mut |engine| {
-            let is_in = engine.mode() == Some(&*self.mode.name);
-            if !is_in && !rows.is_empty() && rows.len() < wanted {
-                left.get_or_insert_with(|| engine.mode().unwrap_or("the end").to_owned());
-            }
-            if is_in && rows.len() < wanted {
-                let read = |port| engine.bus().scalar(port).unwrap_or(f64::NAN);
-                rows.push([read(control) * column, read(all)]);
-            }
+            let read = |port| engine.bus().scalar(port).unwrap_or(f64::NAN);
+            stay.see(engine.mode(), || [read(control) * column, read(all)]);
         });
         let outcome = outcome.map_err(|error| format!("the run cannot start: {error}"))?;
+        let (rows, left) = stay.end();
         Ok(match (&outcome.end, left) {
             (End::Interrupted, _) => Answered::Interrupted,
             (End::Fault(fault), _) => Answered::Nothing(fault.to_string()),

@@ -6,6 +6,7 @@ mod fit;
 mod lift;
 mod page;
 mod save;
+mod stay;
 mod target;
 mod trial;
 mod ways;

@@ -4,8 +4,10 @@ use serde::Serialize;
 use tactflow_runtime::catalogue::Catalogue;
 use tactflow_runtime::engine::{End, Engine, RunOptions, run};
 use tactflow_runtime::graph::{OutlinedMode, Request, compile};
+use tactflow_runtime::node::ScalarId;
 use tactflow_runtime::record::PortColumns;
 
+use super::stay::Stay;
 use super::{Stop, TunedFeature, experiment, lift};
 
 /// How a task holds a feature.
@@ -75,18 +77,13 @@ fn hold(
     });
     let columns: Vec<_> = columns.collect::<Result<_, _>>()?;
     let options = RunOptions { duration: Some(experiment::duration(period)), ..RunOptions::default() };
-    let (mut rows, mut has_begun, mut left): (Vec<Vec<f64>>, bool, Option<String>) = (Vec::new(), false, None);
+    let mut stay = Stay::new(&mode.name, experiment::settling(period), usize::MAX);
     let outcome = run(&mut engine, &options, &mut |engine| {
-        let is_in = engine.mode() == Some(&*mode.name);
-        if has_begun && !is_in && left.is_none() {
-            left = Some(engine.mode().unwrap_or("the end").to_owned());
-        }
-        has_begun |= is_in;
-        if is_in {
-            rows.push(columns.iter().map(|column| engine.bus().scalar(*column).unwrap_or(f64::NAN)).collect());
-        }
+        let read = |column: &ScalarId| engine.bus().scalar(*column).unwrap_or(f64::NAN);
+        stay.see(engine.mode(), || columns.iter().map(read).collect::<Vec<_>>());
     });
     let outcome = outcome.map_err(|error| format!("the run cannot start: {error}"))?;
+    let (rows, left) = stay.end();
     let failure = match (&outcome.end, left) {
         (End::Interrupted, _) => return Err(Stop::Interrupted),
         (End::Fault(fault), _) => Some(fault.to_string()),

@@ -38,6 +38,17 @@ pub(super) struct Axes {
     pub(super) degree: usize,
     /// Place at which the polynomial is wanted: s [m].
     pub(super) at: f64,
+    /// Distance along the axis from this place at which the weight of a tactel has fallen to zero [m].
+    pub(super) reach: f64,
+}
+
+impl Axes {
+    /// Returns the biweight kernel (1 - u²)² at a place: u is its distance from the wanted place in parts of the reach.
+    fn near(&self, along: f64) -> f64 {
+        let part = (along - self.at) / self.reach;
+        let rest = (1.0 - part * part).max(0.0);
+        rest * rest
+    }
 }
 
 /// Returns the polynomial through a region, at one place, or `None` if the region does not determine it.
@@ -48,9 +59,33 @@ pub(super) fn curve(
     region: &Mask,
     axes: &Axes,
 ) -> Option<Curve> {
-    let Axes { centre, axis, length, .. } = axes;
+    let near = |value: f64, along: f64| weight(value) * axes.near(along);
+    // The place from which s is counted: the mean of what is near.
+    let (mut sum, mut moment) = (0.0, 0.0);
+    each(shape, image, region, axes, |value, along, _| {
+        let weight = near(value, along);
+        sum += weight;
+        moment += weight * along;
+    });
+    let origin = moment / sum;
     // The sums of w s^k and of w n s^k.
     let (mut powers, mut right) = ([0.0; 7], [0.0; 4]);
+    each(shape, image, region, axes, |value, along, across| {
+        let (mut term, s) = (near(value, along), (along - origin) / axes.length);
+        for (k, power) in powers.iter_mut().enumerate() {
+            *power += term;
+            if let Some(right) = right.get_mut(k) {
+                *right += term * across;
+            }
+            term *= s;
+        }
+    });
+    solve(&powers, &right, axes, axes.at - origin)
+}
+
+/// Visits the tactels of a region: the value of each, and its place along and across the axis from the centre [m].
+fn each(shape: &ImageShape, image: &Image, region: &Mask, axes: &Axes, mut visit: impl FnMut(f64, f64, f64)) {
+    let Axes { centre, axis, .. } = axes;
     for i in 0..region.rows() {
         let (row, y) = (image.row(i), shape.y(i as f64) - centre[1]);
         for (k, word) in region.row(i).iter().enumerate() {
@@ -59,24 +94,15 @@ pub(super) fn curve(
                 let j = 64 * k + rest.trailing_zeros() as usize;
                 rest &= rest - 1;
                 let x = shape.x(j as f64) - centre[0];
-                let (along, across) = ((axis[0] * x + axis[1] * y) / length, axis[0] * y - axis[1] * x);
-                let mut term = weight(f64::from(row[j]));
-                for (k, power) in powers.iter_mut().enumerate() {
-                    *power += term;
-                    if let Some(right) = right.get_mut(k) {
-                        *right += term * across;
-                    }
-                    term *= along;
-                }
+                visit(f64::from(row[j]), axis[0] * x + axis[1] * y, axis[0] * y - axis[1] * x);
             }
         }
     }
-    solve(&powers, &right, axes)
 }
 
-/// Solves the normal equations. Powers above the degree are left out.
-fn solve(powers: &[f64; 7], right: &[f64; 4], axes: &Axes) -> Option<Curve> {
-    let Axes { length, degree, at, .. } = *axes;
+/// Solves the normal equations, and returns the polynomial at a place [m]. Powers above the degree are left out.
+fn solve(powers: &[f64; 7], right: &[f64; 4], axes: &Axes, at: f64) -> Option<Curve> {
+    let Axes { length, degree, .. } = *axes;
     let normal = Matrix4::from_fn(|i, j| match (i.max(j) <= degree, i == j) {
         (true, _) => powers[i + j],
         (false, is_diagonal) => f64::from(u8::from(is_diagonal)),

@@ -1,7 +1,7 @@
 //! `curvature`: how a line bends, where it is, and the turning rate that follows it.
 //!
 //! A least-squares polynomial n = a + b s + c s² (+ d s³) over the tactels, with s along the long axis and n across it,
-//! both from the centre of gravity. The normal equations Σ_j S_(i+j) p_j = Σ w n s^i, with S_k = Σ w s^k, are solved
+//! both from the centre of gravity. w is the weight of the tactel, times the kernel if there is a reach. The normal equations Σ_j S_(i+j) p_j = Σ w n s^i, with S_k = Σ w s^k, are solved
 //! by a Cholesky factorization, for s in lengths of the line. The curvature is κ = n'' / (1 + n'²)^(3/2).
 //!
 //! The centre of gravity of a bend is beside the line, by κ L²/24 for a length L. The curve is not.
@@ -33,6 +33,12 @@ use curve::{Axes, Curve, curve};
 /// positive if the line turns from +x toward +y on its way. The curve is a parabola. With `degree = 3` it is a cubic,
 /// which also follows a line whose bend changes within the region. A cubic is noisier: the standard deviation of its
 /// direction is 2.5 times that of a parabola over the same length.
+///
+/// The end of a region is seldom square to the line: an `image_window` cuts it along rows or columns, and the pad along
+/// its edges. A cubic takes an oblique end for a bend that changes, and its direction is off by 1.3° on average for a
+/// line that crosses eight rows at up to 9°. With `reach_m`, the weight of a tactel at the distance s along the line
+/// falls as (1 - (s / reach)²)², the biweight kernel of local regression (Cleveland 1979), so that no end counts: it is
+/// off by 0.3°. Let the region be a little longer than twice the reach.
 ///
 /// `turn` is κ L for a length L: the angle between the two ends of an arc. A line whose bend changes, which `degree = 3`
 /// follows, can turn by another angle from end to end. `length` L is that of a uniform bar with the same standard
@@ -75,6 +81,10 @@ pub struct Params {
     /// Degree of the curve: 2 for a parabola, or 3 for a line whose bend changes.
     #[param(unit = "1", range = 2..=3, default = 2)]
     degree: usize,
+    /// Distance along the line from the middle of the pad at which the weight of a tactel has fallen to zero. Without it,
+    /// all tactels of the region count alike.
+    #[param(unit = "m", above = 0.0)]
+    reach_m: Option<f64>,
     /// Smallest anisotropy of a line, from 0 (round) to 1 (a line).
     #[param(unit = "1", range = 0.0..=1.0, default = 0.6)]
     min_anisotropy: f64,
@@ -204,7 +214,14 @@ impl Curvature {
         let axis = [cosine, sine];
         // The middle of the pad, or the end of the line that is nearer to it.
         let at = (-axis[0] * centre[0] - axis[1] * centre[1]).clamp(-0.5 * length, 0.5 * length);
-        let axes = Axes { centre, axis, length, degree: self.params.degree, at };
+        let axes = Axes {
+            centre,
+            axis,
+            length,
+            degree: self.params.degree,
+            at,
+            reach: self.params.reach_m.unwrap_or(f64::INFINITY),
+        };
         let curve = curve(&self.shape, |value| self.weighing.weight(value), image, region, &axes)?;
         let is_line = length >= self.params.min_length_m && curve.curvature().abs() * self.params.min_radius_m <= 1.0;
         is_line.then_some(Line { centre, axis, at, curve })

@@ -18,13 +18,18 @@ pub(crate) fn check(net: &Net<'_>, modes: &[PlannedMode], period: f64, diagnosti
     for (to, (mode, ways)) in modes.iter().zip(&ways_to).enumerate() {
         for exit in &mode.exits {
             let is_immediate = |(from, way): &&(usize, &PlannedExit)| {
-                let watched = implied(&way.condition, &exit.condition);
-                exit.lasts <= way.lasts.max(period) && watched.is_some_and(|port| stays(net, *from, to, port))
+                immediate(way, exit, period).is_some_and(|port| stays(net, *from, to, port))
             };
             let Some((from, way)) = ways.iter().find(is_immediate) else { continue };
             diagnostics.push(report((&modes[*from], way), (mode, exit)));
         }
     }
+}
+
+/// Returns the port that two exits test, if the second one holds as soon as the first one has led into its mode. The
+/// period is in [ns].
+pub(super) fn immediate(way: &PlannedExit, exit: &PlannedExit, period: i64) -> Option<PortRef> {
+    implied(&way.condition, &exit.condition).filter(|_| exit.lasts <= way.lasts.max(period))
 }
 
 /// Returns the port that both conditions test, if the second one always holds when the first one does.
@@ -41,7 +46,7 @@ fn implied(first: &Condition, second: &Condition) -> Option<PortRef> {
 }
 
 /// Returns whether two modes have the same parameters at and upstream of a port, so that a switch does not change it.
-fn stays(net: &Net<'_>, from: usize, to: usize, port: PortRef) -> bool {
+pub(super) fn stays(net: &Net<'_>, from: usize, to: usize, port: PortRef) -> bool {
     let setting =
         |mode: usize, node: usize| net.setting(mode, node).and_then(|value| toml::Value::try_from(value).ok());
     let upstream = net.upstream(port.producer.node());

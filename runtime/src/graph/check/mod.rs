@@ -6,6 +6,7 @@ pub(crate) mod approach;
 pub(crate) mod beside;
 pub(crate) mod calibration;
 mod carried;
+pub(crate) mod chatter;
 pub(crate) mod clock;
 pub(crate) mod commands;
 pub(crate) mod contact;
