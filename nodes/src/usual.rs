@@ -58,9 +58,10 @@ pub fn unusual(param: &str, number: f64, [min, max]: [f64; 2], unit: Unit) -> Op
     let is_usual = |number: f64| (min..=max).contains(&number);
     let rounded = |end: f64| (end * 1e4).round() / 1e4;
     let message = format!("`{param}` is {number} {unit}, but usual is {} to {} {unit}", rounded(min), rounded(max));
+    let within = format!("write a number from {} to {}", rounded(min), rounded(max));
     let help = match from_smaller_unit(number, unit).filter(|(number, _)| is_usual(*number)) {
-        Some((converted, other)) => format!("if {number} is in {other}, write `{converted}`"),
-        None => format!("write a number from {} to {}", rounded(min), rounded(max)),
+        Some((converted, other)) => format!("if {number} is in {other}, write `{converted}`; or else {within}"),
+        None => within,
     };
     let warning = Mistake::new(Code::UnusualValue, At::Param(param.into()), message).help(help);
     (!is_usual(number)).then_some(warning)
@@ -80,7 +81,7 @@ mod tests {
     fn only_a_force_in_newtons_is_unusual() {
         let warning = unusual_force("threshold", 15.0, USUAL_THRESHOLD_N, Unit::NEWTON).expect("15 mN");
         assert_eq!(warning.message, "`threshold` is 15 N, but usual is 0 to 5 N");
-        assert_eq!(warning.help.as_deref(), Some("if 15 is in mN, write `0.015`"));
+        assert_eq!(warning.help.as_deref(), Some("if 15 is in mN, write `0.015`; or else write a number from 0 to 5"));
         for (value, unit) in [(5.0, Unit::NEWTON), (100.0, Unit::RAW)] {
             assert_eq!(unusual_force("threshold", value, USUAL_THRESHOLD_N, unit), None);
         }

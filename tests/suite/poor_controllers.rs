@@ -93,12 +93,64 @@ fn search(speed: &str) -> Vec<String> {
     .into()
 }
 
+/// A first mode that lifts the sensor off with a speed, before the task approaches.
+fn cleared(speed: &str) -> Vec<String> {
+    [
+        "start = \"clear\"".to_owned(),
+        "+[modes.clear]".to_owned(),
+        "+set.projector.select = [0, 0, 0, 0, 0, 0]".to_owned(),
+        format!("+set.reach.twist = [0, 0, {speed}, 0, 0, 0]"),
+        "+go = { to = \"approach\", after_travel_mm = 5, of = \"move.sensor_pose\" }".to_owned(),
+        "+fail = { after_ms = 5000 }".to_owned(),
+    ]
+    .into()
+}
+
+/// A gate in front of a port that a task reads at an input.
+fn gated(kind: &str, port: &str, input: &str, gate: &str) -> Vec<String> {
+    [
+        format!("set nodes.only.type={kind:?}"),
+        format!("set nodes.only.in.value={port:?}"),
+        format!("set nodes.only.in.gate={gate:?}"),
+        format!("set nodes.{input}=\"only.value\""),
+    ]
+    .into()
+}
+
+/// Mistakes that nodes between the feature and the motion hide from a first look.
+fn poor_behind_nodes() -> Vec<(&'static str, Variant)> {
+    let with = |mut changes: Vec<String>, more: &[&str]| {
+        changes.extend(more.iter().map(|change| (*change).to_owned()));
+        Variant { task: "hybrid", bench: None, changes }
+    };
+    let twist = || gated("twist_gate", "projector.twist", "sum.in.touch", "touch.present");
+    let feature = |gate: &str| gated("gate", "touch.x", "error.in.x", gate);
+    let other =
+        |gate: &str| with(feature(gate), &["set nodes.no.type=\"not\"", "set nodes.no.in.flag=\"touch.present\""]);
+    vec![
+        ("low-margin", with(twist(), &["gains.x = { kp = 17.5 }"])),
+        ("wrong-column", with(twist(), &["columns.x = [1, 0, 0, 0, 20, 0]"])),
+        ("low-margin", with(feature("touch.present"), &["gains.x = { kp = 17.5 }"])),
+        ("unfiltered-derivative", with(feature("touch.present"), &["gains.x = { kp = 3.5, kd = 0.1 }"])),
+        ("unused-column", other("no.is_met")),
+        ("unused-column", with(feature("modes.approach"), &[])),
+    ]
+}
+
 /// Columns that move the sensor the wrong way, or along the wrong axis.
 fn wrong_columns() -> Vec<(&'static str, Variant)> {
     let cases = [
         variant("hybrid", &["columns.x = [1, 0, 0, 0, 20, 0]"]),
         variant("hybrid", &["columns.y = [0, 1, 0, -20, 0, 0]"]),
         variant("hybrid", &["columns.pressure = [0, 0, -1, 0, 0, 0]"]),
+        variant(
+            "hybrid",
+            &[
+                "columns.y = [0, -1, 0, 0, 0, 0]",
+                "columns.pressure = [0, 0, 0, 1, 0, 0]",
+                "select = [1, 1, 0, 1, 0, 0]",
+            ],
+        ),
         variant("hybrid", &["columns.x = [0, -1, 0, 20, 0, 0]", "columns.y = [-1, 0, 0, 0, -20, 0]"]),
         variant("hybrid", &["columns.x = [0, -1, 0, 20, 0, 0]"]),
         variant("edge", &["columns.orientation = [0, 0, 0, 0, 0, 1]"]),
@@ -146,9 +198,13 @@ fn poor_gains() -> Vec<(&'static str, Variant)> {
         ("windup", on("pen", variant("force", &["gains.pressure = { kp = 0.5, ki = 0.1 }"]))),
         ("windup", variant("edge", &["gains.orientation = { kp = 6.0, ki = 6.0 }"])),
         ("windup", variant("hybrid", &["gains.x = { kp = 3.5, ki = 1.0, limit = 0.2 }"])),
+        ("windup", variant("hybrid", &["gains.pressure = { kp = 0.5, ki = 0.1, within = 5.0 }"])),
         ("unstable-gain", variant("hybrid", &["gains.x = { kp = 600.0 }"])),
+        // By the sampling alone: 1.2 times the error in each period.
+        ("low-margin", on("held_ball", variant("hybrid", &["gains.x = { kp = 300.0 }"]))),
         ("unusual-gain", variant("hybrid", &["gains.x = { kp = -3.5 }", "columns.x = [1, 0, 0, 0, 20, 0]"])),
         ("unreachable-setpoint", variant("force", &["setpoint = { pressure = 4.0 }"])),
+        ("unreachable-setpoint", variant("force", &["setpoint = { pressure = 0.005 }"])),
         ("unreachable-setpoint", variant("carry", &["set parts.right.set.error.setpoint.force=7.0"])),
         ("unusual-value", variant("position", &["setpoint = { x = 0.2, y = 0.0 }"])),
     ]
@@ -157,6 +213,8 @@ fn poor_gains() -> Vec<(&'static str, Variant)> {
 /// Projectors and modes.
 fn poor_modes() -> Vec<(&'static str, Variant)> {
     let searching = |task: &'static str| Variant { task, bench: None, changes: search("0.03") };
+    let after_a_clearance =
+        Variant { task: "hybrid", bench: None, changes: [search("0.03"), cleared("-0.01")].concat() };
     vec![
         ("unused-column", variant("hybrid", &["select = [1, 1, 0, 0, 0, 0]"])),
         ("unused-column", variant("edge", &["select = [0, 0, 1, 0, 0, 0]"])),
@@ -176,13 +234,16 @@ fn poor_modes() -> Vec<(&'static str, Variant)> {
         ),
         ("fast-recovery", searching("hybrid")),
         ("fast-recovery", searching("edge")),
+        ("fast-recovery", after_a_clearance),
+        ("unused-column", variant("hybrid", &["columns.y = [0.8, -1, 0, 20, 0, 0]", "select = [1, 0, 1, 0, 0, 0]"])),
     ]
 }
 
 #[test]
 fn each_poor_controller_gets_its_warning_and_no_other() {
     let mut wrong = Vec::new();
-    let poor: Vec<_> = [wrong_columns(), poor_gains(), poor_modes()].into_iter().flatten().collect();
+    let poor: Vec<_> =
+        [wrong_columns(), poor_gains(), poor_modes(), poor_behind_nodes()].into_iter().flatten().collect();
     assert!(poor.len() > 50, "{}", poor.len());
     let kinds: BTreeSet<_> = poor.iter().map(|(code, _)| *code).collect();
     for (code, variant) in &poor {
@@ -266,6 +327,9 @@ fn good() -> Vec<Variant> {
         variant("cable", &["select = [1, 0, 1, 0, 1, 1]"]),
         variant("edge", &["select = [1, 1, 1, 1, 1, 1]"]),
         variant("rolling", &["select = [0, 0, 1, 1, 1, 0]"]),
+        variant("hybrid", &["gains.x = { kp = 3.5, kd = 0.005 }"]),
+        // A task that creeps first and then approaches.
+        Variant { task: "hybrid", bench: None, changes: cleared("0.002") },
         // Modes that lead to each other with a gap, or after a while.
         variant("position", &["set modes.servo.go.below=0.04"]),
         variant("position", &["set modes.servo.go.below=0.08", "set modes.servo.go.for_ms=1000"]),

@@ -76,9 +76,10 @@ pub struct Params {
     /// reading, 0.15, or 0.0125 with a `calibration`.
     #[param(unit = "1", above = 0.0)]
     tare_bound: Option<f64>,
-    /// Unit of pressure that the pad states as a fact: p = 1 in the paper.
-    #[param(unit = "N/tactel", above = 0.0, default = 0.1)]
-    pressure: f64,
+    /// Unit of pressure that the pad states as a fact: p = 1 in the paper. The default is 0.1, or three times the threshold
+    /// if that is more: a mean of tactels above the threshold is never below it.
+    #[param(unit = "N/tactel", above = 0.0)]
+    pressure: Option<f64>,
     /// Pose of the pad on the tip of its arm, stated as a fact.
     #[param(default = Mount::NONE)]
     mount: Mount,
@@ -177,6 +178,8 @@ impl Params {
         const NOISE: f64 = 0.05;
         /// Force on a tactel that is above the noise of a calibrated pad [N].
         const THRESHOLD_N: f64 = 0.015;
+        /// Usual pressure: p = 1 in the paper [N per tactel].
+        const PRESSURE: f64 = 0.1;
         /// Largest difference of the zero of a calibrated tactel: 50 of its 4096 steps [1].
         const TARE_BOUND: f64 = 0.0125;
         let mut calibration = toml::Table::new();
@@ -190,7 +193,10 @@ impl Params {
         let default =
             self.full_scale.map_or(if self.is_calibrated() { THRESHOLD_N } else { NOISE }, |full| NOISE * full);
         let unit = if self.is_calibrated() { Unit::NEWTON } else { Unit::ONE };
-        let mut facts = pad::facts(self.threshold.unwrap_or(default), self.pressure, unit, calibration);
+        let rounded = |value: f64| (value * 1e6).round() / 1e6;
+        let threshold = self.threshold.unwrap_or_else(|| rounded(default));
+        let pressure = self.pressure.unwrap_or_else(|| rounded(3.0 * threshold).max(PRESSURE));
+        let mut facts = pad::facts(threshold, pressure, unit, calibration);
         facts.push(pad::mount(&self.mount));
         let bound = if self.calibration.is_some() { TARE_BOUND } else { 3.0 * NOISE };
         facts.extend(pad::rest(self.rest_frames, Some(self.tare_bound.unwrap_or(bound)), Unit::ONE));

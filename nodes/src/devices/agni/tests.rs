@@ -44,15 +44,16 @@ fn each_mistake_in_the_parameters_is_named() {
 
 #[test]
 fn a_pad_states_its_forces_as_far_as_they_are_known() {
-    for (params, calibration, threshold) in [
-        ("", "", "0.05 1"),
-        ("full_scale = 3.0", "gain = 3.0\nunit = \"N\"\n", "0.15000000000000002 N"),
-        ("full_scale = 3.0\nthreshold = 0.02", "gain = 3.0\nunit = \"N\"\n", "0.02 N"),
+    for (params, calibration, threshold, pressure) in [
+        ("", "", "0.05 1", "0.15 1/tactel"),
+        ("full_scale = 3.0", "gain = 3.0\nunit = \"N\"\n", "0.15 N", "0.45 N/tactel"),
+        ("full_scale = 3.0\nthreshold = 0.02", "gain = 3.0\nunit = \"N\"\n", "0.02 N", "0.1 N/tactel"),
+        ("full_scale = 3.0\npressure = 0.2", "gain = 3.0\nunit = \"N\"\n", "0.15 N", "0.2 N/tactel"),
     ] {
         let opened = open::<Agni>(&format!("link = 'serial:/dev/null'\n{params}")).unwrap();
         let fact = |name: &str| opened.description.fact(name).unwrap().clone();
         assert_eq!(toml::to_string(fact("calibration").as_table().unwrap()).unwrap(), calibration);
-        assert_eq!(fact("threshold").as_str(), Some(threshold));
+        assert_eq!((fact("threshold").as_str(), fact("pressure").as_str()), (Some(threshold), Some(pressure)));
     }
 }
 

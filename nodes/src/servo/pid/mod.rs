@@ -87,11 +87,17 @@ impl Gains {
         let negative = [("kp", self.kp), ("ki", self.ki), ("kd", self.kd)].into_iter().find(|(_, value)| *value < 0.0);
         if let Some((gain, value)) = negative {
             let message = format!("the gain `{gain}` of `{feature}` is {value}: it increases the error");
-            let help = format!("write `{gain} = {}`, and reverse the motion in the column of `{feature}`", -value);
+            let help =
+                format!("write `{gain} = {}`, and check that the column of `{feature}` reduces its error", -value);
             return Some(warn(Code::UnusualGain, gain, message)?.help(help));
         }
         if self.kp == 0.0 {
-            let message = format!("the gain `kp` of `{feature}` is 0 1/s: nothing corrects the error");
+            let what = if self.ki > 0.0 {
+                "the integral alone corrects the error, and swings"
+            } else {
+                "nothing corrects the error"
+            };
+            let message = format!("the gain `kp` of `{feature}` is 0 1/s: {what}");
             let help = format!("write a gain greater than 0, or remove the wire of `{feature}` to stop controlling it");
             return Some(warn(Code::UnusualGain, "kp", message)?.help(help));
         }

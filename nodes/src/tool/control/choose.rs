@@ -84,9 +84,10 @@ mod tests {
             setpoint: None,
             jacobian: String::new(),
             pid: None,
-            error: None,
+            compared: None,
             schedule: None,
             filters: Vec::new(),
+            gates: Vec::new(),
         };
         Loop::new(&feature, &Answer { vz: Some(gain), ..Answer::default() }, delay, 1e-4)
     }

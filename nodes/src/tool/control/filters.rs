@@ -18,18 +18,46 @@ pub(crate) struct Filter {
     pub(crate) shape: Shape,
 }
 
-/// Returns the filters behind a port, the first one first, and the port before all of them.
-pub(super) fn filters(nodes: &Nodes<'_>, port: &str) -> (Vec<Filter>, Option<String>) {
-    let (mut filters, mut port) = (Vec::new(), port);
-    while let Some((node, shape, input)) =
-        nodes.writer(port).and_then(|node| Some((node, shape(nodes, node)?, source(node, "value")?)))
-    {
-        let delay_s = shape.delay(nodes.period());
-        filters.push(Filter { node: node.name.clone(), kind: node.kind.text.clone(), delay_s, shape });
-        port = input;
+/// The way of a feature from its measurement to its error.
+#[derive(Debug, Default)]
+pub(super) struct Way {
+    /// The port that is measured.
+    pub(super) measured: String,
+    /// The first one first.
+    pub(super) filters: Vec<Filter>,
+    /// The flags without which the feature does not pass.
+    pub(super) gates: Vec<String>,
+}
+
+impl Way {
+    fn delay(&self) -> f64 {
+        self.filters.iter().map(|filter| filter.delay_s).sum()
     }
-    filters.reverse();
-    (filters, Some(port.to_owned()))
+}
+
+/// Follows a feature back to its measurement. Of the two sides of a `switch`, the slower one counts.
+pub(super) fn way(nodes: &Nodes<'_>, port: &str) -> Way {
+    let measured = || Way { measured: port.to_owned(), ..Way::default() };
+    let Some(node) = nodes.writer(port) else { return measured() };
+    match node.kind.text.as_str() {
+        "switch" => {
+            let sides = ["on", "off"].into_iter().filter_map(|side| Some(way(nodes, source(node, side)?)));
+            sides.max_by(|one, other| one.delay().total_cmp(&other.delay())).unwrap_or_else(measured)
+        }
+        "gate" => {
+            let Some(value) = source(node, "value") else { return measured() };
+            let mut found = way(nodes, value);
+            found.gates.extend(source(node, "gate").map(str::to_owned));
+            found
+        }
+        kind => {
+            let Some((shape, value)) = shape(nodes, node).zip(source(node, "value")) else { return measured() };
+            let mut found = way(nodes, value);
+            let delay_s = shape.delay(nodes.period());
+            found.filters.push(Filter { node: node.name.clone(), kind: kind.to_owned(), delay_s, shape });
+            found
+        }
+    }
 }
 
 /// Returns the filter that a node is.
@@ -46,6 +74,7 @@ fn shape(nodes: &Nodes<'_>, node: &OutlinedBlock) -> Option<Shape> {
             .map(|time| Shape::LowPass { time }),
         "moving_average" => Some(Shape::Mean { samples: samples(10.0) }),
         "median" => Some(Shape::Median { samples: samples(5.0) }),
+        "delay" => Some(Shape::Delay { samples: 1.0 }),
         _ => None,
     }
 }

@@ -3,9 +3,11 @@
 use serde::Serialize;
 use tactflow_runtime::graph::OutlinedBlock;
 
-use super::filters::{Filter, filters};
+use super::filters::{Filter, way};
 use super::schedule::Schedule;
 use super::settings::{Nodes, source};
+use super::shape::Shape;
+use crate::motion::COMPONENTS;
 
 /// What a twist is made of.
 #[derive(Debug, Default, Serialize)]
@@ -13,6 +15,9 @@ pub(crate) struct Law {
     pub(crate) features: Vec<Feature>,
     /// Constant motions.
     pub(crate) constants: Vec<Constant>,
+    /// Whether a node makes constant motions, in this mode or in another one.
+    #[serde(skip)]
+    pub(crate) has_constants: bool,
     /// Other nodes that move the arm, which this command does not know in numbers.
     pub(crate) guidance: Vec<Guidance>,
 }
@@ -35,11 +40,14 @@ pub(crate) struct Feature {
     /// Its controller.
     #[serde(skip)]
     pub(crate) pid: Option<String>,
-    /// The port of its error.
+    /// The node that compares it with its setpoint.
     #[serde(skip)]
-    pub(crate) error: Option<String>,
-    /// Filters from the measurement to the error.
+    pub(crate) compared: Option<String>,
+    /// Filters from the measurement to the motion.
     pub(crate) filters: Vec<Filter>,
+    /// The flags without which it moves nothing.
+    #[serde(skip)]
+    pub(crate) gates: Vec<String>,
     /// What multiplies all three gains, depending on the contact.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(crate) schedule: Option<Schedule>,
@@ -60,6 +68,13 @@ pub(crate) struct Guidance {
     pub(crate) kind: String,
     /// Components that the projectors behind it pass.
     pub(crate) passes: [bool; 6],
+}
+
+impl Guidance {
+    /// Returns the name of the node.
+    pub(crate) fn node(&self) -> &str {
+        self.port.rsplit_once('.').map_or(&*self.port, |(node, _)| node)
+    }
 }
 
 impl Law {
@@ -87,6 +102,16 @@ impl Feature {
         self.measured.as_ref()?.rsplit('.').next()
     }
 
+    /// Adds a node that its motion passes.
+    fn pass(&mut self, nodes: &Nodes<'_>, node: &OutlinedBlock) {
+        self.gates.extend(source(node, "gate").map(str::to_owned));
+        if node.kind.text == "twist_delay" {
+            let (node, kind) = (node.name.clone(), node.kind.text.clone());
+            let shape = Shape::Delay { samples: 1.0 };
+            self.filters.push(Filter { node, kind, delay_s: shape.delay(nodes.period()), shape });
+        }
+    }
+
     /// Returns the delay of all filters [s].
     pub(crate) fn delay(&self) -> f64 {
         self.filters.iter().map(|filter| filter.delay_s).sum()
@@ -112,9 +137,24 @@ fn collect(nodes: &Nodes<'_>, port: &str, passes: [bool; 6], law: &mut Law) {
             source(node, "twist").into_iter().for_each(|twist| collect(nodes, twist, passes, law));
         }
         "pivot" => source(node, "twist").into_iter().for_each(|twist| collect(nodes, twist, passes, law)),
+        "twist_switch" => {
+            let sides = ["on", "off"].into_iter().filter_map(|side| source(node, side));
+            sides.for_each(|side| collect(nodes, side, passes, law));
+        }
+        "twist_gate" | "twist_delay" => {
+            let before = law.features.len();
+            source(node, "value").into_iter().for_each(|twist| collect(nodes, twist, passes, law));
+            law.features[before..].iter_mut().for_each(|feature| feature.pass(nodes, node));
+        }
+        "compose_twist" => {
+            let is_wired = |i: usize| source(node, COMPONENTS[i]).is_some();
+            let passes = std::array::from_fn(|i| passes[i] && is_wired(i));
+            law.guidance.push(Guidance { port: port.to_owned(), kind: node.kind.text.clone(), passes });
+        }
         "twist_source" => {
             let twist: [f64; 6] = nodes.value(node, "twist").and_then(|twist| twist.value.read()).unwrap_or_default();
             let twist = masked(twist);
+            law.has_constants = true;
             if twist.iter().any(|part| *part != 0.0) {
                 law.constants.push(Constant { node: node.name.clone(), twist });
             }
@@ -144,14 +184,13 @@ fn feature(nodes: &Nodes<'_>, jacobian: &OutlinedBlock, name: String, column: [f
         let table = || nodes.value(error, "setpoint")?.value.as_table()?.get(&name)?.read();
         one.or_else(table)
     });
-    let (filters, measured) = match error.and_then(|error| source(error, &name)) {
-        Some(port) => filters(nodes, port),
-        None => (Vec::new(), None),
-    };
+    let way = error.and_then(|error| source(error, &name)).map(|port| way(nodes, port));
+    let measured = way.as_ref().map(|way| way.measured.clone());
+    let (filters, gates) = way.map(|way| (way.filters, way.gates)).unwrap_or_default();
     let [kp, ki, kd] = ["kp", "ki", "kd"].map(gain);
-    let error = pid.and_then(|pid| source(pid, "error")).map(|port| format!("{port}.{name}"));
+    let compared = error.map(|error| error.name.clone());
     let pid = pid.map(|pid| pid.name.clone());
     let schedule = scheduled.and_then(|node| Schedule::of(nodes, node, &name, measured.as_deref()));
     let jacobian = jacobian.name.clone();
-    Feature { column, kp, ki, kd, measured, setpoint, filters, schedule, name, jacobian, pid, error }
+    Feature { column, kp, ki, kd, measured, setpoint, filters, gates, schedule, name, jacobian, pid, compared }
 }

@@ -54,6 +54,9 @@ const FREQUENCIES: usize = 4000;
 /// Smallest frequency of a sweep, as a fraction of the largest one.
 const SPAN: f64 = 1e-6;
 
+/// Angle from the negative real axis of a response that is on it [rad].
+const ON_AXIS: f64 = 1e-6;
+
 /// Sweeps a loop up to half of the rate of the graph.
 pub(crate) fn margins(around: &Loop) -> Margins {
     swept(around, FREQUENCIES)
@@ -102,12 +105,13 @@ fn crossings(open: &[(f64, Complex<f64>)]) -> Vec<(f64, Complex<f64>)> {
     crossed.map(|pair| between(pair, |at| libm::log(at.norm()))).collect()
 }
 
-/// Returns the gains at which the response crosses the negative real axis.
+/// Returns the gains at which the response crosses the negative real axis, or ends on it at half of the rate.
 fn turns(open: &[(f64, Complex<f64>)]) -> impl Iterator<Item = f64> {
     let crosses = |pair: &&[(f64, Complex<f64>)]| {
         (pair[0].1.im >= 0.0) != (pair[1].1.im >= 0.0) && pair[0].1.re < 0.0 && pair[1].1.re < 0.0
     };
-    open.windows(2).filter(crosses).map(|pair| between(pair, |at| at.im).1.norm())
+    let last = open.last().map(|(_, at)| at).filter(|at| at.re < 0.0 && at.im.abs() < ON_AXIS * at.norm());
+    open.windows(2).filter(crosses).map(|pair| between(pair, |at| at.im).1.norm()).chain(last.map(|at| at.norm()))
 }
 
 /// Returns where a function of the response is 0, between two neighbours.
@@ -129,7 +133,7 @@ fn is_stable(open: &[(f64, Complex<f64>)], integrators: usize) -> bool {
     for pair in open.windows(2) {
         angle += ((one + pair[1].1) / (one + pair[0].1)).arg();
     }
-    angle.abs() < PI
+    angle.abs() < PI - ON_AXIS
 }
 
 /// Returns the share of a setpoint that the feature follows.
@@ -174,9 +178,10 @@ mod tests {
             setpoint: None,
             jacobian: String::new(),
             pid: None,
-            error: None,
+            compared: None,
             schedule: None,
             filters: Vec::new(),
+            gates: Vec::new(),
         };
         let (hz, damping) = resonance.unzip();
         let answer = Answer { vx: Some(-1.0), resonance_hz: hz, damping_ratio: damping, ..Answer::default() };
@@ -198,6 +203,18 @@ mod tests {
         for (gain, is_stable) in [(15.0, true), (15.5, true), (15.9, false), (40.0, false)] {
             assert_eq!(integrator(gain, 0.0, delay, None, 1e-5).is_stable, is_stable, "{gain}: the bound is pi / 0.2");
         }
+    }
+
+    #[test]
+    fn a_sampled_integrator_has_the_margins_of_its_closed_form() {
+        // L = k / (z - 1): the largest gain is 2, and the peak of |1 / (1 + L)| is 2 / (2 - k) at z = -1.
+        for share in [0.5, 1.2, 1.9] {
+            let found = integrator(share / 0.004, 0.0, 0.0, None, 0.004);
+            near(found.gain_db, 20.0 * (2.0 / share).log10(), 1e-3);
+            near(Some(found.peak_sensitivity), (2.0 / (2.0 - share)).max(1.0), 1e-3);
+            assert!(found.is_stable, "{share}");
+        }
+        assert!(!integrator(2.1 / 0.004, 0.0, 0.0, None, 0.004).is_stable);
     }
 
     #[test]

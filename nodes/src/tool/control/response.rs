@@ -1,12 +1,12 @@
 //! The frequency response of a loop: from the error of a feature around to the measured feature.
 //!
 //! ```text
-//! L(s) = K(s) · J c · hold(s) / s · A(s) · exp(-s latency) · F(s)
+//! L(z) = K(z) · J c · T / (z - 1) · A(s) · exp(-s latency) · F(z),  z = exp(s T)
 //! ```
 //!
 //! K is the `pid`, c the column behind all projectors, J the answer of the feature to the motion of the sensor, A the
-//! resonance of arm and contact, and F the filters. A command is held for one period. K and F are those of sampled
-//! signals, at z = exp(s T). Not in it: limits, dry friction, hysteresis, and what one feature does to another.
+//! resonance of arm and contact, and F the filters. A command is held for one period, and T / (z - 1) is the travel at
+//! the samples: exact up to half of the rate of the graph, where the resonance leaves nothing of the motion. Not in it: limits, dry friction, hysteresis, and what one feature does to another.
 
 use nalgebra::Complex;
 
@@ -114,10 +114,10 @@ fn between(known: &[(f64, Complex<f64>)], omega: f64) -> Complex<f64> {
     low.1 * turn(-libm::atan2(ratio.im, ratio.re) * share) * norm
 }
 
-/// Returns the response of motion to a speed that is held for a period [s].
+/// Returns the response of motion, at the samples, to a speed that is held for a period [s].
 fn travel(omega: f64, period: f64) -> Complex<f64> {
-    let s = Complex::new(0.0, omega);
-    (Complex::from(1.0) - turn(omega * period)) / (s * s * period)
+    let ago = turn(omega * period);
+    ago * period / (Complex::from(1.0) - ago)
 }
 
 /// Returns the response of a resonance with its circular frequency [rad/s] and damping ratio.
@@ -200,9 +200,10 @@ mod tests {
             setpoint: None,
             jacobian: String::new(),
             pid: None,
-            error: None,
+            compared: None,
             schedule: None,
             filters: [Shape::Mean { samples: 10.0 }, Shape::LowPass { time: 0.1 }].map(filter).into(),
+            gates: Vec::new(),
         };
         let around = Loop::new(&feature, &answer, 0.0, 0.004);
         for samples in [400, 200, 100, 50, 20] {

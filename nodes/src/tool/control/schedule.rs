@@ -4,7 +4,7 @@ use serde::Serialize;
 use tactflow_runtime::graph::OutlinedBlock;
 
 use super::contacts::Answer;
-use super::filters::filters;
+use super::filters::way;
 use super::settings::{Nodes, source};
 
 /// Smallest and largest factor of a `gain_schedule` that states none [1].
@@ -48,6 +48,6 @@ impl Schedule {
 fn nominal(nodes: &Nodes<'_>, schedule: &OutlinedBlock, measured: &str) -> Option<f64> {
     let estimate = nodes.writer(source(schedule, "ratio")?)?;
     let is_commanded = estimate.kind.text == "stiffness_estimate" && source(estimate, "equilibrium").is_some();
-    let (_, origin) = filters(nodes, source(estimate, "value")?);
-    (is_commanded && origin.as_deref() == Some(measured)).then(|| nodes.number(estimate, "nominal"))?
+    let origin = way(nodes, source(estimate, "value")?).measured;
+    (is_commanded && origin == measured).then(|| nodes.number(estimate, "nominal"))?
 }

@@ -20,6 +20,11 @@ pub(crate) enum Shape {
         /// Number of samples.
         samples: f64,
     },
+    /// The value some time ago.
+    Delay {
+        /// Number of samples.
+        samples: f64,
+    },
 }
 
 impl Shape {
@@ -29,6 +34,7 @@ impl Shape {
         match self {
             Self::LowPass { time } => time,
             Self::Mean { samples } | Self::Median { samples } => (samples - 1.0) / 2.0 * period,
+            Self::Delay { samples } => samples * period,
         }
     }
 
@@ -42,7 +48,7 @@ impl Shape {
                 Complex::from(share) / (one - turn(angle) * (1.0 - share))
             }
             Self::Mean { samples } => (one - turn(samples * angle)) / ((one - turn(angle)) * samples),
-            Self::Median { .. } => turn(omega * self.delay(period)),
+            Self::Median { .. } | Self::Delay { .. } => turn(omega * self.delay(period)),
         }
     }
 }
@@ -64,7 +70,7 @@ mod tests {
         assert!((mean.response(omega, 0.004) - sum / 10.0).norm() < 1e-12);
         let low = Shape::LowPass { time: 0.1 };
         assert!((low.response(10.0, 1e-5).norm() - 0.5_f64.sqrt()).abs() < 1e-4);
-        for shape in [mean, low, Shape::Median { samples: 5.0 }] {
+        for shape in [mean, low, Shape::Median { samples: 5.0 }, Shape::Delay { samples: 1.0 }] {
             let slow = shape.response(0.1, 1e-4);
             assert!((slow.arg() + 0.1 * shape.delay(1e-4)).abs() < 1e-5, "{shape:?}");
         }

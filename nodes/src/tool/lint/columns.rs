@@ -1,5 +1,6 @@
 //! Columns: those that increase an error, those that change another feature, and those that nothing uses.
 
+use std::collections::BTreeSet;
 use std::f64::consts::{FRAC_PI_2, PI};
 
 use tactflow_runtime::graph::OutlinedBlock;
@@ -8,7 +9,8 @@ use tactflow_runtime::source::{Code, Diagnostic, Diagnostics, Edit, Item};
 use super::rows::{Answer, Row};
 use super::{Controlled, ModeLaw};
 use crate::motion::COMPONENTS;
-use crate::tool::control::law::Feature;
+use crate::tool::control::contacts::Contact;
+use crate::tool::control::law::{Feature, law};
 use crate::tool::control::settings::{Nodes, source};
 
 /// Largest angle between a line and an axis of the sensor along which the line lies [rad].
@@ -24,11 +26,15 @@ pub(super) fn check(arm: &Controlled<'_>, found: &mut Diagnostics) {
 
 /// Returns the warning about a column that increases the error of its feature, or that does not change the feature.
 fn wrong(arm: &Controlled<'_>, mode: &ModeLaw<'_>, feature: &Feature) -> Option<Diagnostic> {
-    let quantity = mode.quantity(feature)?;
-    let row = Row::of(quantity)?;
+    let Some((quantity, row)) = mode.quantity(feature).and_then(|quantity| Some((quantity, Row::of(quantity)?))) else {
+        return reversed(arm, mode, feature);
+    };
     let column = mode.column(feature)?;
     if !row.changes(&column) {
         return foreign(mode, feature, quantity, column);
+    }
+    if !row.changes(&feature.column) {
+        return Some(blocked(mode, feature, &row));
     }
     let is_reversed = |answer: &&Answer| {
         // What the bench says about this object counts more than geometry.
@@ -50,11 +56,46 @@ fn wrong(arm: &Controlled<'_>, mode: &ModeLaw<'_>, feature: &Feature) -> Option<
     Some(replaced(mode, feature, message, right))
 }
 
+/// Returns the warning about a column that increases the error of a feature of which only the bench says how it answers.
+fn reversed(arm: &Controlled<'_>, mode: &ModeLaw<'_>, feature: &Feature) -> Option<Diagnostic> {
+    let quantity = feature.quantity()?;
+    let column = mode.column(feature)?;
+    let gain = |contact: &&Contact| {
+        let answer = contact.features.get(quantity)?.row();
+        Some(answer.iter().zip(feature.column).map(|(answer, entry)| answer * entry).sum::<f64>())
+    };
+    let contact = arm.contacts.iter().find(|contact| gain(contact).is_some_and(|gain| gain < 0.0))?;
+    let message = format!(
+        "the column of `{}` increases its error over `{}`: there, `contacts` of the bench says how `{quantity}` answers",
+        feature.name, contact.object
+    );
+    Some(replaced(mode, feature, message, column.map(|entry| -entry)))
+}
+
+/// Returns the warning about a column of which the projectors leave only what does not change the feature.
+fn blocked(mode: &ModeLaw<'_>, feature: &Feature, row: &Row) -> Diagnostic {
+    let name = &feature.name;
+    let message = format!(
+        "{}the projector leaves only {} of the column of `{name}`, which does not change `{name}`",
+        mode.named(),
+        moved(&feature.column)
+    );
+    let help = format!(
+        "select {} in the projector, or write 0 for `{name}` in the gains of this mode",
+        row.components(" or ")
+    );
+    Diagnostic::new(Code::UnusedColumn, mode.place_of_column(feature), message).help(help)
+}
+
+/// Returns the components that a column moves, for a message.
+fn moved(column: &[f64; 6]) -> String {
+    let moved: Vec<String> = (0..6).filter(|i| column[*i] != 0.0).map(|i| format!("`{}`", COMPONENTS[i])).collect();
+    moved.join(" and ")
+}
+
 /// Returns the warning about a column that does not change its feature.
 fn foreign(mode: &ModeLaw<'_>, feature: &Feature, quantity: &str, column: [f64; 6]) -> Option<Diagnostic> {
-    let moved: Vec<String> =
-        (0..6).filter(|i| feature.column[*i] != 0.0).map(|i| format!("`{}`", COMPONENTS[i])).collect();
-    let moved = moved.join(" and ");
+    let moved = moved(&feature.column);
     let row = Row::of(quantity)?;
     // The feature whose column changes this one, and that this column changes.
     let other = mode.law.features.iter().find_map(|other| {
@@ -86,9 +127,11 @@ fn foreign(mode: &ModeLaw<'_>, feature: &Feature, quantity: &str, column: [f64; 
             diagnostic.edit(edit).help(help).note(place, "the other column")
         });
     }
-    let right: Vec<String> = row.known.iter().map(|answer| format!("`{}`", COMPONENTS[answer.component])).collect();
-    let message = format!("the column of `{}` moves {moved}, which does not change `{quantity}`", feature.name);
-    let help = format!("`{quantity}` answers to {}: write the entry there", right.join(" and "));
+    let message = format!(
+        "the column of `{}` moves {moved}, which does not change `{quantity}` in a known direction",
+        feature.name
+    );
+    let help = format!("`{quantity}` answers to {}: write the entry there", row.components(" and "));
     Some(Diagnostic::new(Code::WrongColumn, mode.place_of_column(feature), message).help(help))
 }
 
@@ -105,51 +148,59 @@ fn array(column: &[f64; 6]) -> String {
     format!("[{}]", entries.join(", "))
 }
 
-/// Returns the projectors right behind an `inverse_jacobian`, with it.
-fn projectors<'a>(nodes: &Nodes<'a>, port: &str) -> Vec<(&'a OutlinedBlock, &'a OutlinedBlock)> {
+/// Returns the projectors between a port and what moves the sensor.
+fn projectors<'a>(nodes: &Nodes<'a>, port: &str) -> Vec<&'a OutlinedBlock> {
     let Some(node) = nodes.writer(port) else { return Vec::new() };
+    let all = |inputs: &[&str]| -> Vec<&'a OutlinedBlock> {
+        let ports = inputs.iter().filter_map(|input| source(node, input));
+        ports.flat_map(|port| projectors(nodes, port)).collect()
+    };
     match node.kind.text.as_str() {
         "twist_adder" => node.wires.iter().flat_map(|wire| projectors(nodes, &wire.source)).collect(),
-        "pivot" => source(node, "twist").map_or_else(Vec::new, |twist| projectors(nodes, twist)),
-        "projector" => {
-            let behind = source(node, "twist").and_then(|twist| nodes.writer(twist));
-            behind
-                .filter(|behind| behind.kind.text == "inverse_jacobian")
-                .map(|behind| (node, behind))
-                .into_iter()
-                .collect()
-        }
+        "twist_switch" => all(&["on", "off"]),
+        "twist_gate" | "twist_delay" => all(&["value"]),
+        "pivot" => all(&["twist"]),
+        "projector" => [vec![node], all(&["twist"])].concat(),
         _ => Vec::new(),
     }
 }
 
 /// Returns the warnings about components that a projector selects and that no column moves.
 fn idle(arm: &Controlled<'_>, mode: &ModeLaw<'_>) -> Diagnostics {
-    let found = projectors(&mode.nodes, &arm.twist).into_iter().filter_map(|(projector, jacobian)| {
-        let setting = mode.nodes.value(projector, "select")?;
-        let select: [f64; 6] = setting.value.read()?;
-        // All components: the projector selects nothing.
-        if select.iter().all(|entry| *entry != 0.0) {
-            return None;
-        }
-        let settings = mode.nodes.values(jacobian).filter(|(path, _)| path.starts_with("columns."));
-        let columns: Vec<[f64; 6]> = settings.filter_map(|(_, setting)| setting.value.read()).collect();
-        let i = (0..6).find(|i| select[*i] != 0.0 && columns.iter().all(|column| column[*i] == 0.0))?;
+    projectors(&mode.nodes, &arm.twist).into_iter().flat_map(|projector| idle_axes(mode, projector)).collect()
+}
+
+fn idle_axes(mode: &ModeLaw<'_>, projector: &OutlinedBlock) -> Diagnostics {
+    let select = mode.nodes.node(&projector.name).and_then(|node| mode.nodes.value(node, "select"));
+    let behind = source(projector, "twist").map(|twist| law(&mode.nodes, twist));
+    let Some((setting, behind)) = select.zip(behind) else { return Diagnostics::new() };
+    let Some(select) = setting.value.read::<[f64; 6]>() else { return Diagnostics::new() };
+    // All components: the projector selects nothing. A constant motion may be that of another mode.
+    let selects_all = select.iter().all(|entry| *entry != 0.0);
+    let only_columns = behind.guidance.is_empty() && !behind.features.is_empty() && !behind.has_constants;
+    if selects_all || !only_columns {
+        return Diagnostics::new();
+    }
+    let is_idle = |i: &usize| select[*i] != 0.0 && behind.features.iter().all(|feature| feature.column[*i] == 0.0);
+    let jacobians: BTreeSet<&str> = behind.features.iter().map(|feature| &*feature.jacobian).collect();
+    let jacobians: Vec<String> = jacobians.into_iter().map(|name| format!("`{name}`")).collect();
+    let report = |i: usize| {
         let name = COMPONENTS[i];
-        let entries = match &setting.value.item {
+        let entry = match &setting.value.item {
             Item::Array(entries) => entries.get(i),
             _ => None,
         };
-        let place = entries.map_or_else(|| setting.value.span.clone(), |entry| entry.span.clone());
-        let message = format!("`{}` selects `{name}`, but no column of `{}` moves it", projector.name, jacobian.name);
+        let place = entry.map_or_else(|| setting.value.span.clone(), |entry| entry.span.clone());
+        let (projector, jacobians) = (&projector.name, jacobians.join(" and "));
+        let message = format!("`{projector}` selects `{name}`, but no column of {jacobians} moves it");
         let help = format!("write 0 for `{name}`, or add an entry to the column of the feature that it should control");
         let diagnostic = Diagnostic::new(Code::IdleAxis, place.clone(), message).help(help);
-        Some(match entries {
+        match entry {
             Some(_) => diagnostic.edit(Edit::Replace(place, "0".into())),
             None => diagnostic,
-        })
-    });
-    found.collect()
+        }
+    };
+    (0..6).filter(is_idle).map(report).collect()
 }
 
 /// Returns the warnings about columns that no mode uses, although their features have gains.
@@ -164,15 +215,14 @@ fn unused(arm: &Controlled<'_>) -> Diagnostics {
     let dead = features.filter(|feature| !controls(feature) && !is_along_line(arm, feature));
     let found = dead.filter_map(|feature| {
         let column = first.column(feature)?;
-        let moved: Vec<String> = (0..6).filter(|i| column[*i] != 0.0).map(|i| format!("`{}`", COMPONENTS[i])).collect();
-        let (message, help) = match moved.is_empty() {
+        let (message, help) = match column == [0.0; 6] {
             true => (
                 format!("the column of `{}` is zero, so its gains do nothing", feature.name),
                 "write how the sensor should move for it, or remove the feature".to_owned(),
             ),
             false => (
                 format!("no mode selects a component of the column of `{}`, so its gains do nothing", feature.name),
-                format!("select {} in a projector, or remove the feature", moved.join(" or ")),
+                format!("select {} in a projector, or remove the feature", moved(&column)),
             ),
         };
         Some(Diagnostic::new(Code::UnusedColumn, first.place_of_column(feature), message).help(help))

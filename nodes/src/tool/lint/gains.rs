@@ -1,7 +1,10 @@
 //! Gains that do harm whatever is touched: derivatives of noise, and integrals that wind up.
 
+use std::f64::consts::FRAC_PI_2;
+
 use tactflow_runtime::source::{Code, Diagnostic, Diagnostics};
 
+use super::modes::force_limit;
 use super::{Controlled, ModeLaw};
 use crate::tool::control::law::Feature;
 
@@ -14,27 +17,42 @@ pub(super) fn check(arm: &Controlled<'_>, found: &mut Diagnostics) {
 
 /// Returns the warning about a derivative of a feature that no filter smooths.
 fn unfiltered(mode: &ModeLaw<'_>, feature: &Feature) -> Option<Diagnostic> {
-    if feature.kd == 0.0 || !feature.filters.is_empty() {
+    let period = mode.nodes.period();
+    // The difference of two samples has √2 times their noise.
+    let factor = 2.0_f64.sqrt() * feature.kd / period;
+    // A filter of less than a period smooths nothing, and a share below that of `kp` does no harm.
+    if feature.delay() >= period || factor <= feature.kp {
         return None;
     }
     mode.quantity(feature)?;
     let name = &feature.name;
-    // The difference of two samples has √2 times their noise.
-    let factor = 2.0_f64.sqrt() * feature.kd / mode.nodes.period();
     let message = format!(
         "`kd` of `{name}` differentiates a signal without a filter: the noise of a sample moves the sensor with a gain of \
          {factor:.1} 1/s"
     );
-    let help =
-        format!("remove `kd`, or put a `low_pass` with `time_constant_ms = 20` on the wire that measures `{name}`");
+    let smooth = (5.0 * period * 1e3).max(20.0).ceil();
+    let help = format!(
+        "remove `kd`, or put a `low_pass` with `time_constant_ms = {smooth}` on the wire that measures `{name}`"
+    );
     Some(Diagnostic::new(Code::UnfilteredDerivative, mode.place_of_gain(feature, "kd"), message).help(help))
+}
+
+/// Returns the largest error that a feature can have, as far as it is known.
+fn largest_error(arm: &Controlled<'_>, mode: &ModeLaw<'_>, feature: &Feature) -> f64 {
+    match mode.quantity(feature) {
+        Some("orientation") => FRAC_PI_2,
+        Some(quantity @ ("pressure" | "force")) => {
+            force_limit(arm, mode, quantity).map_or(f64::INFINITY, |(most, _)| most)
+        }
+        _ => f64::INFINITY,
+    }
 }
 
 /// Returns the warning about an integral that grows at every error, up to a motion at full speed.
 fn windup(arm: &Controlled<'_>, mode: &ModeLaw<'_>, feature: &Feature) -> Option<Diagnostic> {
     let pid = mode.nodes.node(feature.pid.as_deref()?)?;
     let number = |key: &str| mode.nodes.number(pid, &format!("gains.{}.{key}", feature.name));
-    if feature.ki == 0.0 || number("within").is_some() {
+    if feature.ki == 0.0 || number("within").is_some_and(|within| within < largest_error(arm, mode, feature)) {
         return None;
     }
     let limiter = arm.limits.iter().find(|limiter| limiter.kind == "twist_limit")?;
@@ -42,7 +60,8 @@ fn windup(arm: &Controlled<'_>, mode: &ModeLaw<'_>, feature: &Feature) -> Option
     let [linear, angular] =
         ["linear_m_per_s", "angular_rad_per_s"].map(|key| mode.nodes.number(limiter, key).unwrap_or(f64::INFINITY));
     // The control at which the first component of the motion reaches its limit.
-    let shares = (0..6).map(|i| if i < 3 { linear } else { angular } / feature.column[i].abs());
+    let scheduled = feature.schedule.as_ref().map_or(1.0, |schedule| schedule.max.max(1.0));
+    let shares = (0..6).map(|i| if i < 3 { linear } else { angular } / (scheduled * feature.column[i].abs()));
     let full = shares.fold(f64::INFINITY, f64::min);
     let bound = [number("bound"), number("limit")].into_iter().flatten().fold(f64::INFINITY, f64::min);
     if bound < full {

@@ -8,6 +8,8 @@
 mod columns;
 mod gains;
 mod modes;
+mod presence;
+mod recovery;
 mod rows;
 mod stability;
 
@@ -15,7 +17,7 @@ use std::collections::BTreeSet;
 use std::ops::Range;
 
 use tactflow_runtime::graph::{NO_SPAN, Outline, OutlinedMode};
-use tactflow_runtime::source::{Code, Diagnostics};
+use tactflow_runtime::source::{Code, Diagnostic, Diagnostics};
 
 use super::control::chain::{Limiter, chain};
 use super::control::contacts::{Contact, contacts};
@@ -54,9 +56,16 @@ pub(crate) fn lint(outline: &Outline, facts: &[(String, toml::Value)]) -> Diagno
     let carried = carried(outline);
     let mut found = Diagnostics::new();
     for (command, port) in &commands {
+        let arm = command.split('.').next().unwrap_or_default();
+        if let Err(why) = contacts(facts, arm) {
+            let message = format!("no loop of `{arm}` is checked over a contact, because its contacts cannot be read");
+            found.push(Diagnostic::new(Code::UnusualValue, place_of_role(outline, arm), message).help(why));
+        }
         let Some(arm) = controlled((outline, &index, &carried), facts, (command, port)) else { continue };
         let before = found.len();
         modes::check(&arm, &mut found);
+        recovery::check(&arm, &mut found);
+        presence::check(&arm, &mut found);
         columns::check(&arm, &mut found);
         gains::check(&arm, &mut found);
         stability::check(&arm, &mut found);
@@ -82,6 +91,13 @@ fn without_consequences(mut found: Diagnostics) -> Diagnostics {
     found
 }
 
+/// Returns the place of the device of a role, in the bench.
+fn place_of_role(outline: &Outline, role: &str) -> Range<usize> {
+    let role = outline.roles.iter().find(|one| one.name == role);
+    let device = role.and_then(|role| outline.devices.iter().find(|device| device.name == role.device.text));
+    device.map_or(NO_SPAN, |device| device.span.clone())
+}
+
 /// Returns the frames of the sensors whose pose follows from the joints of an arm. What the others measure moves with the
 /// object, and not against the sensor.
 fn carried(outline: &Outline) -> BTreeSet<&str> {
@@ -103,7 +119,6 @@ fn controlled<'a>(
         ModeLaw { mode, carried, nodes, law: law(&nodes, &twist) }
     });
     let modes = modes.collect();
-    // `explain` says what is wrong with contacts that cannot be read.
     let contacts = contacts(facts, command.split('.').next()?).unwrap_or_default();
     Some(Controlled { outline, task, limits, twist, contacts, modes })
 }

@@ -4,6 +4,8 @@
 //! the sensor turns toward the object, it is touched: a turn about +y moves the side at -x toward the object, and a turn
 //! about +x the side at +y. This holds for objects of every shape.
 
+use crate::motion::COMPONENTS;
+
 /// A component of a twist that changes a feature.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Answer {
@@ -18,10 +20,8 @@ pub(super) struct Answer {
 /// The components that change a feature.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Row {
-    /// Those with a known sign.
+    /// Those with a known sign. A tilt changes a force too, in either direction.
     pub(super) known: &'static [Answer],
-    /// Those that may change it in either direction.
-    pub(super) other: &'static [usize],
 }
 
 const fn answer(component: usize, sign: f64, reason: &'static str) -> Answer {
@@ -43,18 +43,24 @@ impl Row {
     /// Returns the components that change a quantity; `None` if geometry does not say.
     pub(super) fn of(quantity: &str) -> Option<Self> {
         match quantity {
-            "x" => Some(Self { known: X, other: &[] }),
-            "y" => Some(Self { known: Y, other: &[] }),
-            "pressure" | "force" => Some(Self { known: FORCE, other: &[3, 4] }),
-            "orientation" => Some(Self { known: ANGLE, other: &[] }),
+            "x" => Some(Self { known: X }),
+            "y" => Some(Self { known: Y }),
+            "pressure" | "force" => Some(Self { known: FORCE }),
+            "orientation" => Some(Self { known: ANGLE }),
             _ => None,
         }
     }
 
+    /// Returns the components that change it, for a message.
+    pub(super) fn components(self, or: &str) -> String {
+        let names: Vec<String> =
+            self.known.iter().map(|answer| format!("`{}`", COMPONENTS[answer.component])).collect();
+        names.join(or)
+    }
+
     /// Returns whether a motion changes the quantity.
     pub(super) fn changes(self, column: &[f64; 6]) -> bool {
-        let known = self.known.iter().map(|answer| answer.component);
-        known.chain(self.other.iter().copied()).any(|component| column[component] != 0.0)
+        self.known.iter().any(|answer| column[answer.component] != 0.0)
     }
 }
 
@@ -63,7 +69,6 @@ mod tests {
     use nalgebra::{Rotation3, Vector3};
 
     use super::*;
-    use crate::motion::COMPONENTS;
 
     /// Where a pad with a pose touches a ball: the point of the pad's plane that is nearest to the centre, in its frame.
     fn touched(turn: Vector3<f64>, at: Vector3<f64>, centre: Vector3<f64>) -> Vector3<f64> {

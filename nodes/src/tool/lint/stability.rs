@@ -43,11 +43,17 @@ pub(super) fn check(arm: &Controlled<'_>, found: &mut Diagnostics) {
     for mode in &arm.modes {
         let period = mode.nodes.period();
         for feature in mode.moving().filter(|feature| feature.kp > 0.0 && feature.kp * period < DIVERGES) {
-            if mode.quantity(feature).is_some() && seen.insert(key(feature)) {
+            if is_known(mode, feature, contacts) && seen.insert(key(feature)) {
                 found.extend(judge(mode, feature, contacts));
             }
         }
     }
+}
+
+/// Returns whether geometry or a contact of the bench says how a feature answers.
+fn is_known(mode: &ModeLaw<'_>, feature: &Feature, contacts: &[Contact]) -> bool {
+    let is_stated = |quantity: &str| contacts.iter().any(|contact| contact.features.contains_key(quantity));
+    mode.quantity(feature).is_some() || feature.quantity().is_some_and(is_stated)
 }
 
 /// Returns what makes the loops of two features the same.
@@ -77,16 +83,18 @@ fn judge(mode: &ModeLaw<'_>, feature: &Feature, contacts: &[Contact]) -> Option<
         all.iter().filter(|found| is(found)).max_by(|one, other| peak(one).total_cmp(&peak(other)))
     };
     let low = worst(&|found| !KEPT.holds(&found.margins));
-    let is_slow = |found: &Found<'_>| {
-        let has_phase = found.margins.is_stable && found.margins.phase_deg.is_none_or(|phase| phase >= GOOD_PHASE);
-        found.lag > MAX_LAG && !has_phase
-    };
-    let slow = worst(&is_slow).filter(|_| low.is_none() || feature.delay() > SLOW);
+    let slow = worst(&|found| is_slow(&found.margins, found.lag)).filter(|_| low.is_none() || feature.delay() > SLOW);
     match (slow, low) {
         (Some(slow), _) => slow_filter(mode, feature, contacts, slow),
         (_, Some(low)) => Some(low_margin(mode, feature, &loops, low)),
         _ => None,
     }
+}
+
+/// Returns whether filters with this lag [deg] take the phase margin of a loop.
+fn is_slow(margins: &Margins, lag: f64) -> bool {
+    let has_phase = margins.is_stable && margins.phase_deg.is_none_or(|phase| phase >= GOOD_PHASE);
+    lag > MAX_LAG && !has_phase
 }
 
 /// Returns the lag of the filters of a feature at a frequency [deg].
@@ -117,7 +125,9 @@ fn low_margin(mode: &ModeLaw<'_>, feature: &Feature, loops: &[(&Contact, Loop)],
     };
     let diagnostic = Diagnostic::new(Code::LowMargin, place, message);
     let loops: Vec<Loop> = loops.iter().map(|(_, around)| around.clone()).collect();
-    let Some(factor) = factor(&loops, KEPT).filter(|factor| *factor < 1.0) else {
+    let Some(factor) =
+        factor(&loops, KEPT).filter(|factor| *factor < 1.0).and_then(|factor| quick(mode, feature, &loops, factor))
+    else {
         return diagnostic
             .help("no gain keeps the margins: use faster filters, or a smaller `ki` in proportion to `kp`");
     };
@@ -132,27 +142,46 @@ fn low_margin(mode: &ModeLaw<'_>, feature: &Feature, loops: &[(&Contact, Loop)],
     })
 }
 
+/// Returns the largest factor on the gains, up to a first one, with which the filters are quick enough for each loop.
+fn quick(mode: &ModeLaw<'_>, feature: &Feature, loops: &[Loop], first: f64) -> Option<f64> {
+    let period = mode.nodes.period();
+    let is_quick = |factor: f64| {
+        let found = loops.iter().map(|around| margins(&around.times(factor)));
+        found.into_iter().all(|found| {
+            let lag = found.crossover_hz.map_or(0.0, |hz| lag(feature, hz, period));
+            KEPT.holds(&found) && !is_slow(&found, lag)
+        })
+    };
+    std::iter::successors(Some(first), |factor| Some(factor * 0.95)).take(40).find(|factor| is_quick(*factor))
+}
+
 /// Returns a number with two digits that is not larger.
 fn rounded_down(number: f64) -> f64 {
     if number <= 0.0 {
         return 0.0;
     }
-    let digits = 1.0 - libm::floor(libm::log10(number));
+    rounded(number, libm::floor)
+}
+
+/// Returns a number with two digits.
+fn rounded(number: f64, round: impl Fn(f64) -> f64) -> f64 {
+    let digits = 1.0 - libm::floor(libm::log10(number.abs()));
     let scale = libm::pow(10.0, digits);
-    let exact = libm::floor(number * scale) / scale;
+    let exact = round(number * scale) / scale;
     // To the nearest number with few digits.
     format!("{exact:.4}").parse().unwrap_or(exact)
 }
 
 fn slow_filter(mode: &ModeLaw<'_>, feature: &Feature, contacts: &[Contact], slow: &Found<'_>) -> Option<Diagnostic> {
     let filters = feature.filters.iter().enumerate();
+    let filters = filters.filter(|(_, filter)| !matches!(filter.shape, Shape::Delay { .. }));
     let (i, slowest) = filters.max_by(|(_, one), (_, other)| one.delay_s.total_cmp(&other.delay_s))?;
     let node = mode.nodes.node(&slowest.node)?;
     let keys = ["time_constant_ms", "cutoff_hz", "window_ms", "window"];
     let key = keys.into_iter().find(|key| mode.nodes.number(node, key).is_some());
     let name = &feature.name;
     let left = match slow.margins.phase_deg.filter(|_| slow.margins.is_stable) {
-        Some(phase) => format!("a phase margin of {phase:.0}° is left"),
+        Some(phase) => format!("a phase margin of {}° is left", libm::floor(phase)),
         None => "the loop is unstable".into(),
     };
     let message = format!(
@@ -165,17 +194,20 @@ fn slow_filter(mode: &ModeLaw<'_>, feature: &Feature, contacts: &[Contact], slow
     );
     let place = mode.place(&slowest.node, key.unwrap_or_default());
     let diagnostic = Diagnostic::new(Code::SlowFilter, place.clone(), message);
-    let faster = key.and_then(|key| Some((key, faster(mode, feature, contacts, i)? * mode.nodes.number(node, key)?)));
-    Some(match faster {
-        Some((key @ ("time_constant_ms" | "window_ms"), value)) => {
-            let value = rounded_down(value);
-            let help = format!("write `{key} = {value}` or less, or smaller gains of `{name}`");
-            let diagnostic = diagnostic.help(help);
-            // A default is written nowhere, so it has no text to replace.
-            if place == node.span { diagnostic } else { diagnostic.edit(Edit::Replace(place, format!("{value}"))) }
-        }
-        _ => diagnostic.help("use a faster filter, or smaller gains"),
-    })
+    let share = faster(mode, feature, contacts, i);
+    let Some(((key, old), share)) = key.and_then(|key| Some((key, mode.nodes.number(node, key)?))).zip(share) else {
+        return Some(diagnostic.help("use a faster filter, or smaller gains"));
+    };
+    let (value, more) = match key {
+        // Rounded up.
+        "cutoff_hz" => (rounded(old / share, libm::ceil), "more"),
+        "window" => (libm::floor(old * share).max(1.0), "less"),
+        _ => (rounded_down(old * share), "less"),
+    };
+    let help = format!("write `{key} = {value}` or {more} in `{}`, or smaller gains of `{name}`", slowest.node);
+    let diagnostic = diagnostic.help(help);
+    // A default is written nowhere, so it has no text to replace.
+    Some(if place == node.span { diagnostic } else { diagnostic.edit(Edit::Replace(place, format!("{value}"))) })
 }
 
 /// Returns the part of the delay of a filter with which the loop is good over all contacts.
@@ -194,7 +226,8 @@ fn faster(mode: &ModeLaw<'_>, feature: &Feature, contacts: &[Contact], i: usize)
         let Filter { shape, .. } = &mut feature.filters[i];
         match shape {
             Shape::LowPass { time } => *time *= share,
-            Shape::Mean { samples } | Shape::Median { samples } => *samples = (*samples * share).max(1.0),
+            Shape::Mean { samples } | Shape::Median { samples } => *samples = libm::floor(*samples * share).max(1.0),
+            Shape::Delay { .. } => {}
         }
         is_good(&feature)
     })

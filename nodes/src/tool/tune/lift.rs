@@ -15,14 +15,10 @@ const SPEED: f64 = 0.015;
 /// Returns the settings that let a mode end after so long [s], whatever its exits `go` say, and lift the sensor off.
 /// Exits that fail, and those of a lost contact, stay.
 pub(super) fn settings(outline: &Outline, mode: &OutlinedMode, adder: &str, after_s: f64) -> Vec<String> {
-    let after_ms = (after_s * 1e3).ceil();
-    let mut exits = vec![format!("{{ to = \"{MODE}\", after_ms = {after_ms:?}, priority = 1 }}")];
-    // The modes behind the exits stay reachable, by words that nobody sends.
-    exits.extend(targets(mode).iter().map(|to| format!("{{ to = {to:?}, on = \"{MODE}_{to}\" }}")));
     let projectors = outline.nodes.iter().filter(|node| node.kind.text == "projector");
     let free = projectors.map(|node| format!("modes.{MODE}.set.{}.select=[0, 0, 0, 0, 0, 0]", node.name));
     let away = [
-        format!("modes.{}.go=[{}]", mode.name, exits.join(", ")),
+        go(mode, MODE, after_s),
         format!("nodes.{MODE}_twist.type=twist_source"),
         format!("nodes.{MODE}_twist.twist=[0, 0, 0, 0, 0, 0]"),
         format!("nodes.{adder}.in.{MODE}={MODE}_twist.twist"),
@@ -30,6 +26,19 @@ pub(super) fn settings(outline: &Outline, mode: &OutlinedMode, adder: &str, afte
         format!("modes.{MODE}.done={{ after_ms = {:?} }}", LASTS_S * 1e3),
     ];
     away.into_iter().chain(free).collect()
+}
+
+/// Returns the setting that lets a mode go on to another one after so long [s], instead of its own exits `go`.
+pub(super) fn go(mode: &OutlinedMode, to: &str, after_s: f64) -> String {
+    let mut exits = vec![after(to, after_s)];
+    // The modes behind the exits stay reachable, by words that nobody sends.
+    exits.extend(targets(mode).iter().map(|to| format!("{{ to = {to:?}, on = \"{MODE}_{to}\" }}")));
+    format!("modes.{}.go=[{}]", mode.name, exits.join(", "))
+}
+
+/// Returns an exit to a mode after so long [s].
+pub(super) fn after(to: &str, after_s: f64) -> String {
+    format!("{{ to = {to:?}, after_ms = {:?}, priority = 1 }}", (after_s * 1e3).ceil())
 }
 
 /// Returns the modes to which the exits `go` of a mode lead.

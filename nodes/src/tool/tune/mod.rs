@@ -7,6 +7,7 @@ mod lift;
 mod page;
 mod save;
 mod stay;
+mod step;
 mod target;
 mod trial;
 mod ways;
@@ -31,7 +32,7 @@ use crate::motion::COMPONENTS;
 use experiment::{Experiment, Line};
 use fit::{ENOUGH, Fit, fit};
 use target::{adder, controlled};
-use trial::Settled;
+use trial::{Settled, Trial};
 use ways::{Response, agreed};
 
 /// Measure how the features answer the motion, and propose gains with margins
@@ -246,7 +247,8 @@ fn tune(args: &TuneArgs, shell: &Shell, request: &Request, outline: &Outline) ->
     for (case, contact) in cases.iter().zip(&tuned.contacts) {
         let (mut request, _) = on_bench(request, case, shell)?;
         request.set.extend(lift::settings(outline, mode, &adder, experiment::measured(outline.period_s)));
-        tuned.settled.extend(trial::compare(shell.catalogue(), &request, mode, &tuned.features, &contact.object)?);
+        let trial = Trial { catalogue: shell.catalogue(), request: &request, outline, mode };
+        tuned.settled.extend(trial.compare(&tuned.features, &contact.object)?);
     }
     Ok(tuned)
 }

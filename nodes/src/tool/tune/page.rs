@@ -4,6 +4,8 @@ use std::fmt::Write;
 
 use tactflow_runtime::cli::table;
 
+use super::step::Step;
+use super::trial::Held;
 use super::{Found, Tuned, TunedFeature, save};
 
 /// Columns of the table of answers.
@@ -85,15 +87,17 @@ fn gains(feature: &TunedFeature) -> String {
 fn settled(tuned: &Tuned) -> String {
     let mut text = String::new();
     for one in &tuned.settled {
-        let error = |value: Option<f64>| value.map_or_else(|| "unknown".into(), |value| rounded(value).to_string());
+        let error = |held: &Held| held.error.map_or_else(|| "unknown".into(), |error| rounded(error).to_string());
+        let (old, new) = (error(&one.old), error(&one.new));
         let _ = write!(
             text,
-            "Over `{}`, the error of `{}` in the second half is {} with the old gains and {} with the new ones (rms)",
-            one.object,
-            one.feature,
-            error(one.old),
-            error(one.new)
+            "Over `{}`, the error of `{}` is {old} with the old gains and {new} with the new ones (rms)",
+            one.object, one.feature
         );
+        if let Some((old, new)) = one.old.step.zip(one.new.step) {
+            let (size, old, new) = (rounded(new.size), followed(&old), followed(&new));
+            let _ = write!(text, ". A step of {size} {old} with the old gains, and {new} with the new ones");
+        }
         match &one.failure {
             Some(why) => {
                 let _ = writeln!(text, ": not good, {why}.");
@@ -102,6 +106,15 @@ fn settled(tuned: &Tuned) -> String {
         }
     }
     text
+}
+
+/// Returns how a step is followed, for a sentence.
+fn followed(step: &Step) -> String {
+    let overshoot = 100.0 * step.overshoot;
+    match step.rise_s {
+        Some(rise) => format!("reaches 90 % in {rise:.2} s and overshoots by {overshoot:.0} %"),
+        None => "does not reach 90 %".to_owned(),
+    }
 }
 
 /// The lines for the files.

@@ -86,7 +86,7 @@ pub struct Params {
     #[param(unit = "m", above = 0.0)]
     reach_m: Option<f64>,
     /// Smallest anisotropy of a line, from 0 (round) to 1 (a line).
-    #[param(unit = "1", range = 0.0..=1.0, default = 0.6)]
+    #[param(unit = "1", range = 0.0..=1.0, usual = ..=0.95, default = 0.6)]
     min_anisotropy: f64,
     /// Smallest length of a line.
     #[param(unit = "m", above = 0.0, default = 0.015)]

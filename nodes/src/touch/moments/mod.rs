@@ -58,7 +58,7 @@ pub struct Moments {
 #[derive(Debug, Clone, Param)]
 pub struct Params {
     /// Smallest anisotropy, from 0 (round) to 1 (a line), at which a contact has an orientation.
-    #[param(unit = "1", range = 0.0..=1.0, default = 0.1)]
+    #[param(unit = "1", range = 0.0..=1.0, usual = ..=0.95, default = 0.1)]
     pub(super) min_anisotropy: f64,
     /// Weight of each tactel: its value, its excess over `threshold`, or 1.
     #[param(default = Weight::Force)]

@@ -2,7 +2,7 @@
 //!
 //! A bound on time or travel ends a motion if it ends the run or leads to a mode that ends its motion. The loss of a
 //! contact does too. Neither counts if the mode can be entered again and again without a contact, because each entry
-//! starts the bound afresh.
+//! starts the bound afresh. A mode that a lost contact ends first does not lead on by time.
 
 use std::collections::BTreeSet;
 
@@ -122,7 +122,8 @@ impl<'a> Endings<'a> {
         match &exit.condition {
             Condition::Sent(_) => false,
             Condition::Elapsed(time) => {
-                self.ends_of(mode).all(|end| !matches!(end, Condition::Elapsed(at) if at <= time))
+                let is_late = self.ends_of(mode).any(|end| matches!(end, Condition::Elapsed(at) if at <= time));
+                !is_late && !self.is_lost_before(exit, *time, mode)
             }
             Condition::Travel(pose, way) => {
                 self.ends_of(mode).all(|end| !matches!(end, Condition::Travel(of, at) if of == pose && at <= way))
@@ -131,6 +132,18 @@ impl<'a> Endings<'a> {
             | Condition::Port(watched, Test::Between { .. }) => !self.contact.need(self.net, watched.source),
             Condition::Port(..) | Condition::Lost(..) => true,
         }
+    }
+
+    /// Returns whether the loss of a contact ends a mode before an exit that is taken after `time` [ns]. At the same time,
+    /// `on_lost` wins.
+    ///
+    /// The contact must be that of each arm that moves in the mode or in the next one: a sensor on another arm may have
+    /// its contact all the time.
+    fn is_lost_before(&self, exit: &PlannedExit, time: i64, mode: usize) -> bool {
+        let generators = || [Some(mode), exit.to].into_iter().flatten().flat_map(|mode| self.generators[mode]);
+        let is_before = |lost: &&PlannedExit| matches!(lost.condition, Condition::Lost(_, at) if at <= time);
+        let mut losses = self.modes[mode].exits.iter().filter(is_before);
+        generators().next().is_some() && losses.any(|lost| generators().all(|node| self.ends(lost, *node)))
     }
 
     /// Returns the conditions on which a mode ends the run.

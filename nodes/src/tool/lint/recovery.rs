@@ -1,0 +1,98 @@
+//! A lost contact that is searched for faster than the task has approached it.
+
+use std::collections::BTreeSet;
+
+use tactflow_runtime::source::{Code, Diagnostic, Diagnostics, Item, Value};
+
+use super::{Controlled, ModeLaw};
+
+/// An exit of a mode that leads to another one.
+pub(super) struct Exit<'a> {
+    to: &'a str,
+    value: &'a Value,
+}
+
+impl ModeLaw<'_> {
+    /// Returns the exits of a kind that lead to other modes.
+    pub(super) fn exits(&self, kind: &'static str) -> impl Iterator<Item = Exit<'_>> {
+        let settings = self.mode.iter().flat_map(|mode| &mode.settings).filter(move |setting| setting.path == kind);
+        let each = settings.flat_map(|setting| match &setting.value.item {
+            Item::Array(exits) => exits.iter().collect(),
+            _ => vec![&setting.value],
+        });
+        each.filter_map(|value| Some(Exit { to: value.as_table()?.get("to")?.as_str()?, value }))
+    }
+
+    /// Returns the exits that are taken when the contact is lost.
+    fn lost(&self) -> impl Iterator<Item = Exit<'_>> {
+        self.exits("on_lost").chain(self.exits("go").filter(Exit::is_lost))
+    }
+
+    fn own_name(&self) -> &str {
+        self.mode.map_or("", |mode| mode.name.rsplit('.').next().unwrap_or_default())
+    }
+
+    /// Returns the speed along +z with which the mode moves the sensor whatever it feels [m/s].
+    fn approach(&self) -> f64 {
+        self.law.constants.iter().map(|constant| constant.twist[2]).sum()
+    }
+}
+
+impl Exit<'_> {
+    /// Returns whether a `go` waits until there is no contact.
+    fn is_lost(&self) -> bool {
+        let word = |key: &str| self.value.as_table()?.get(key)?.as_str();
+        word("when").is_some_and(|port| port.ends_with(".present")) && matches!(word("is"), Some("false" | "absent"))
+    }
+}
+
+pub(super) fn check(arm: &Controlled<'_>, found: &mut Diagnostics) {
+    let task = arm.outline.tasks.iter().find(|task| task.name == arm.task);
+    let settings = task.map_or(&arm.outline.settings, |task| &task.settings);
+    let start = settings.iter().find(|setting| setting.path == "start").and_then(|start| start.value.as_str());
+    let Some(start) = start else { return };
+    let first = search(arm, start, &BTreeSet::new());
+    let Some((slow, first_speed)) = fastest(arm, &first).filter(|(_, speed)| *speed > 0.0) else { return };
+    for mode in &arm.modes {
+        found.extend(mode.lost().filter(|exit| !first.contains(exit.to)).filter_map(|exit| {
+            let (fast, again) = fastest(arm, &search(arm, exit.to, &first))?;
+            (again > first_speed * (1.0 + 1e-9)).then(|| report(&exit, (fast, again), (slow, first_speed)))
+        }));
+    }
+}
+
+/// Returns the modes from one on in which the task has no contact: up to those that a lost contact ends, and to those
+/// that are known.
+fn search<'a>(arm: &'a Controlled<'_>, from: &'a str, known: &BTreeSet<&str>) -> BTreeSet<&'a str> {
+    let (mut open, mut found) = (vec![from], BTreeSet::new());
+    while let Some(name) = open.pop() {
+        let Some(mode) = named(arm, name) else { continue };
+        let has_contact = mode.lost().next().is_some();
+        if !has_contact && !known.contains(name) && found.insert(name) {
+            open.extend(mode.exits("go").map(|exit| exit.to));
+        }
+    }
+    found
+}
+
+fn named<'a>(arm: &'a Controlled<'_>, name: &str) -> Option<&'a ModeLaw<'a>> {
+    arm.modes.iter().find(|mode| mode.own_name() == name)
+}
+
+/// Returns the mode that approaches fastest, with its speed [m/s].
+fn fastest<'a>(arm: &Controlled<'_>, modes: &BTreeSet<&'a str>) -> Option<(&'a str, f64)> {
+    let speeds = modes.iter().filter_map(|name| Some((*name, named(arm, name)?.approach())));
+    speeds.max_by(|(_, one), (_, other)| one.total_cmp(other))
+}
+
+fn report(exit: &Exit<'_>, (fast, again): (&str, f64), (slow, first): (&str, f64)) -> Diagnostic {
+    let message = format!(
+        "after a lost contact, mode `{fast}` moves toward the object with {again} m/s: faster than mode `{slow}`, which \
+         approaches with {first} m/s"
+    );
+    let help = format!(
+        "let `{fast}` move with {first} m/s or less along +z: the object is near, and a fast touch presses hard"
+    );
+    let to = exit.value.as_table().and_then(|table| table.get("to"));
+    Diagnostic::new(Code::FastRecovery, to.unwrap_or(exit.value).span.clone(), message).help(help)
+}
