@@ -34,6 +34,9 @@ pub struct Outline {
     pub nodes: Vec<OutlinedBlock>,
     /// The devices that fill the roles.
     pub devices: Vec<OutlinedBlock>,
+    /// The facts that the bench states, `role.fact`, with their places.
+    #[serde(skip)]
+    pub facts: Vec<(String, Value)>,
 }
 
 /// A word of a graph file.

@@ -80,6 +80,28 @@ fn a_contact_on_another_arm_does_not_end_a_motion() {
     assert!(report.render(false).contains("left_slide"), "{}", report.render(false));
 }
 
+#[test]
+fn a_lost_contact_ends_a_cycle_of_its_own_arm_only() {
+    let codes = |of: &str, after_ms: i64| {
+        let lost = format!("on_lost={{ of = '{of}', after_ms = {after_ms}, to = 'still' }}");
+        // Both modes move the right arm, and lead to each other by time.
+        let changes = [
+            "modes.hold.set.right_reach.twist=[0, 0, 0.008, 0, 0, 0]".to_owned(),
+            "modes.search.go={ to = 'hold', after_ms = 3000 }".to_owned(),
+            "modes.hold.go={ to = 'search', after_ms = 3000 }".to_owned(),
+            "modes.still.set.right_reach.twist=[0, 0, 0, 0, 0, 0]".to_owned(),
+            format!("modes.search.{lost}"),
+            format!("modes.hold.{lost}"),
+        ];
+        let request = changes.into_iter().fold(two_arms(), |request, change| request.set(change));
+        let diagnostics = compile(&catalogue(), &request).err().map_or_else(Vec::new, |report| report.diagnostics);
+        diagnostics.into_iter().map(|diagnostic| diagnostic.code.name()).collect::<Vec<_>>()
+    };
+    assert!(codes("right_touch.present", 100).is_empty(), "{:?}", codes("right_touch.present", 100));
+    assert_eq!(codes("right_touch.present", 3100), ["ungated-motion"], "the time comes first");
+    assert!(codes("left_touch.present", 100).contains(&"ungated-motion"), "the left arm may have its contact");
+}
+
 /// A right arm whose motion reads the force of the left arm's limiter, and whose guidance has this gate.
 fn coupled(gate: &str) -> Request {
     let blocks = [

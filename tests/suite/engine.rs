@@ -93,7 +93,7 @@ const EVENTS: [Event; 11] = [
     Event {
         task: "cable",
         scene: "--scene pen --radius 0.003 --size 0.25 0.1 --bend 0.044 --change 3 3",
-        holds: &[("/after/lost", 0.0), ("/after/line/0", 3.0), ("/after/line/1", 0.5), ("/after/line/2", 0.15)],
+        holds: &[("/after/lost", 0.0), ("/after/line/0", 2.0), ("/after/line/1", 0.5), ("/after/line/2", 0.15)],
     },
     // A pad with faults, and one frame of garbage.
     Event {

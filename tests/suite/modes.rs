@@ -61,6 +61,15 @@ fn what_ends_a_mode() {
 }
 
 #[test]
+fn for_ms_starts_anew_in_each_mode() {
+    let high = "when = 'a.value', above = 2.0, for_ms = 20";
+    let modes = format!(
+        "[modes.one]\ngo = {{ to = 'two', {high} }}\n[modes.two]\ngo = {{ to = 'next', {high} }}\n[modes.next]"
+    );
+    assert_eq!(course(&modes, &[Some(3.0); 6]), "ootttn", "the value has been high for 50 ms");
+}
+
+#[test]
 fn a_sensor_that_has_stopped_decides_nothing() {
     let modes = "[modes.one]\ngo = { to = 'two', when = 'a.value', above = 2.0, for_ms = 20 }\n[modes.two]";
     let stopped = [Some(3.0), None, None, None, None, None];

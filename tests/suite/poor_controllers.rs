@@ -207,6 +207,11 @@ fn poor_gains() -> Vec<(&'static str, Variant)> {
         ("unreachable-setpoint", variant("force", &["setpoint = { pressure = 0.005 }"])),
         ("unreachable-setpoint", variant("carry", &["set parts.right.set.error.setpoint.force=7.0"])),
         ("unusual-value", variant("position", &["setpoint = { x = 0.2, y = 0.0 }"])),
+        // Contacts that cannot be read check nothing.
+        (
+            "unusual-value",
+            variant("hybrid", &["set facts.arm.contacts=[{ object = \"ball\", pressure = { vz = 10.0, resonance = 5.0 } }]"]),
+        ),
     ]
 }
 

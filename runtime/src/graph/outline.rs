@@ -47,7 +47,14 @@ impl OutlineBuilder<'_> {
             modes: (0..flat.modes.len()).map(|mode| self.mode(mode)).collect(),
             nodes: self.nodes.iter().filter_map(|node| self.node(node)).collect(),
             devices: self.devices(),
+            facts: self.facts(),
         }
+    }
+
+    fn facts(&self) -> Vec<(String, Value)> {
+        let roles = self.net.flat.bench.iter().flat_map(|bench| &bench.facts);
+        let facts = roles.flat_map(|(role, table)| table.entries.iter().map(move |(fact, value)| (role, fact, value)));
+        facts.map(|(role, fact, value)| (format!("{}.{}", role.name, fact.name), value.clone())).collect()
     }
 
     fn policy(&self, task: &Task) -> Vec<Setting> {

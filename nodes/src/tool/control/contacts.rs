@@ -118,6 +118,7 @@ pub(crate) fn contacts(facts: &[(String, toml::Value)], arm: &str) -> Result<Vec
     let wrong = |why: String| {
         let example =
             r#"contacts = [{ object = "ball", pressure = { vz = 12.0, resonance_hz = 5.0, damping_ratio = 0.2 } }]"#;
+        let why = why.trim_end();
         format!("`contacts` in `[facts.{arm}]` of the bench: {why}\nwrite, for example, `{example}`")
     };
     let contacts: Vec<Contact> = value.clone().try_into().map_err(|error: toml::de::Error| wrong(error.to_string()))?;

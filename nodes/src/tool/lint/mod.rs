@@ -12,12 +12,13 @@ mod presence;
 mod recovery;
 mod rows;
 mod stability;
+mod unread;
 
 use std::collections::BTreeSet;
 use std::ops::Range;
 
 use tactflow_runtime::graph::{NO_SPAN, Outline, OutlinedMode};
-use tactflow_runtime::source::{Code, Diagnostic, Diagnostics};
+use tactflow_runtime::source::{Code, Diagnostics};
 
 use super::control::chain::{Limiter, chain};
 use super::control::contacts::{Contact, contacts};
@@ -57,10 +58,7 @@ pub(crate) fn lint(outline: &Outline, facts: &[(String, toml::Value)]) -> Diagno
     let mut found = Diagnostics::new();
     for (command, port) in &commands {
         let arm = command.split('.').next().unwrap_or_default();
-        if let Err(why) = contacts(facts, arm) {
-            let message = format!("no loop of `{arm}` is checked over a contact, because its contacts cannot be read");
-            found.push(Diagnostic::new(Code::UnusualValue, place_of_role(outline, arm), message).help(why));
-        }
+        found.extend(unread::check(outline, facts, arm));
         let Some(arm) = controlled((outline, &index, &carried), facts, (command, port)) else { continue };
         let before = found.len();
         modes::check(&arm, &mut found);
@@ -89,13 +87,6 @@ fn without_consequences(mut found: Diagnostics) -> Diagnostics {
         _ => true,
     });
     found
-}
-
-/// Returns the place of the device of a role, in the bench.
-fn place_of_role(outline: &Outline, role: &str) -> Range<usize> {
-    let role = outline.roles.iter().find(|one| one.name == role);
-    let device = role.and_then(|role| outline.devices.iter().find(|device| device.name == role.device.text));
-    device.map_or(NO_SPAN, |device| device.span.clone())
 }
 
 /// Returns the frames of the sensors whose pose follows from the joints of an arm. What the others measure moves with the

@@ -83,14 +83,19 @@ pub(super) struct Experiment<'a> {
     pub(super) component: usize,
     /// Period of the graph [s].
     pub(super) period: f64,
+    /// Share of the gains of the graph with which it is measured [1].
+    pub(super) share: f64,
 }
+
+/// Share of the gains of which the response is told, and with which a loop is measured first [1].
+pub(super) const HALF: f64 = 0.5;
 
 /// The response at one frequency.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Line {
     /// Circular frequency [rad/s].
     pub(super) omega: f64,
-    /// The response around the loop: L, by the controller of the experiment.
+    /// The response around the loop: L, with half of the gains of the graph.
     pub(super) open: Complex<f64>,
     /// Amplitude of the whole motion [m] or [rad].
     pub(super) way: f64,
@@ -174,7 +179,7 @@ pub(super) fn duration(period: f64) -> f64 {
 }
 
 impl Experiment<'_> {
-    /// Runs with a signal that moves the sensor to and fro by a way [m] or [rad], at half of the gains.
+    /// Runs with a signal that moves the sensor to and fro by a way [m] or [rad].
     ///
     /// # Errors
     /// If the graph with the signal does not load.
@@ -210,11 +215,17 @@ impl Experiment<'_> {
             _ if rows[sines[0].begin..].iter().flatten().any(|value| !value.is_finite()) => {
                 Answered::Nothing(format!("`{}` was absent for a while", self.feature.name))
             }
-            _ => Answered::Lines(sines.iter().map(|sine| line(&rows, sine, self.period)).collect()),
+            _ => Answered::Lines(sines.iter().map(|sine| self.line(&rows, sine)).collect()),
         })
     }
 
-    /// Returns the settings of a run: the signal, its way into the motion, half of the gains, and the end.
+    /// Returns the response to a sine, with half of the gains: the controller is linear.
+    fn line(&self, rows: &[[f64; 2]], sine: &Sine) -> Line {
+        let line = line(rows, sine, self.period);
+        Line { open: line.open * (HALF / self.share), ..line }
+    }
+
+    /// Returns the settings of a run: the signal, its way into the motion, the share of the gains, and the end.
     fn settings(&self, way: f64) -> Vec<String> {
         let unit = if self.component < 3 { "m/s" } else { "rad/s" };
         let fastest = FASTEST[self.component];
@@ -238,7 +249,7 @@ impl Experiment<'_> {
             ]);
         }
         let Feature { kp, ki, kd, column, .. } = *self.feature;
-        set.extend(gains(self.feature, self.mode, [kp / 2.0, ki / 2.0, kd / 2.0]));
+        set.extend(gains(self.feature, self.mode, [kp, ki, kd].map(|gain| gain * self.share)));
         // Otherwise the gains would change while they are measured.
         let schedule = self.feature.schedule.iter();
         set.extend(schedule.flat_map(|one| ["min", "max"].map(|key| format!("nodes.{}.{key}=1.0", one.node))));

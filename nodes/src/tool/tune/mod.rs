@@ -29,7 +29,7 @@ use super::control::margins::{Margins, margins};
 use super::control::response::Loop;
 use super::control::settings::{self, Index, Nodes};
 use crate::motion::COMPONENTS;
-use experiment::{Experiment, Line};
+use experiment::{Experiment, HALF, Line};
 use fit::{ENOUGH, Fit, fit};
 use target::{adder, controlled};
 use trial::{Settled, Trial};
@@ -207,75 +207,81 @@ fn tune(args: &TuneArgs, shell: &Shell, request: &Request, outline: &Outline) ->
     let (mode, controlled) = controlled(args, &index, &twist)?;
     let adder = adder(&index, &twist)?;
     let wanted = Wanted { peak: args.peak, gain_db: args.gain_margin, phase_deg: args.phase_margin };
-    let cases = cases(args);
-    let (mut contacts, mut files) = (Vec::new(), Vec::new());
-    let mut answers: Vec<Vec<Found>> = controlled.iter().map(|_| Vec::new()).collect();
-    for case in &cases {
-        let (request, file) = on_bench(request, case, shell)?;
-        let stem = file.as_ref().and_then(|file| file.file_stem()).map(|stem| stem.to_string_lossy().into_owned());
-        let object =
-            stem.unwrap_or_else(|| "object".into()) + &case.also.map_or_else(String::new, |set| format!(" with {set}"));
-        files.push(file);
-        let mut contact = Contact { object, latency_ms: 0.0, features: BTreeMap::new() };
-        for (feature, answers) in controlled.iter().zip(&mut answers) {
-            let experiment = Experiment {
-                catalogue: shell.catalogue(),
-                request: &request,
-                outline,
-                mode,
-                adder: &adder,
-                feature,
-                component: 0,
-                period: outline.period_s,
-            };
-            let found = identify(&experiment, &contact.object, outline.period_s, shell)?;
-            if found.refused.is_none() {
-                let quantity = quantity(feature);
-                contact.features.insert(quantity.clone(), answer(&quantity, &found.fits));
+    let cases: Vec<Case> = cases(args, request, shell)?;
+    let mut contacts: Vec<Contact> = cases.iter().map(Case::contact).collect();
+    let mut features = Vec::new();
+    for feature in &controlled {
+        let mut measure = |share: f64| -> Result<TunedFeature, Stop> {
+            let found = cases.iter().zip(&mut contacts).map(|(case, contact)| {
+                let (catalogue, component, period) = (shell.catalogue(), 0, outline.period_s);
+                let (request, adder) = (&case.request, &*adder);
+                let experiment =
+                    Experiment { catalogue, request, outline, mode, adder, feature, component, period, share };
+                let found = identify(&experiment, &case.object, period, shell)?;
+                if found.refused.is_none() {
+                    let quantity = quantity(feature);
+                    contact.features.insert(quantity.clone(), answer(&quantity, &found.fits));
+                }
+                Ok(found)
+            });
+            let found = found.collect::<Result<Vec<Found>, Stop>>()?;
+            Ok(propose(feature.clone(), found, &contacts, wanted, outline.period_s))
+        };
+        let first = measure(HALF)?;
+        // A loop with very different gains says little about the frequencies that count.
+        features.push(match first.factor().filter(|factor| !(1.0 / FAR..=FAR).contains(factor)) {
+            Some(factor) => {
+                let name = &feature.name;
+                shell.say_beside(&format!("`{name}`: again, with half of {factor:.1} times the gains"));
+                measure(HALF * factor)?
             }
-            answers.push(found);
-        }
-        contacts.push(contact);
+            None => first,
+        });
     }
-    let features: Vec<TunedFeature> = controlled
-        .into_iter()
-        .zip(answers)
-        .map(|(feature, answers)| propose(feature, answers, &contacts, wanted, outline.period_s))
-        .collect();
     let arm = command.trim_end_matches(".velocity").to_owned();
+    let files = cases.iter().map(|case| case.file.clone()).collect();
     let mut tuned = Tuned { mode: mode.name.clone(), arm, wanted, contacts, files, features, settled: Vec::new() };
-    for (case, contact) in cases.iter().zip(&tuned.contacts) {
-        let (mut request, _) = on_bench(request, case, shell)?;
+    for case in &cases {
+        let mut request = case.request.clone();
         request.set.extend(lift::settings(outline, mode, &adder, experiment::measured(outline.period_s)));
         let trial = Trial { catalogue: shell.catalogue(), request: &request, outline, mode };
-        tuned.settled.extend(trial.compare(&tuned.features, &contact.object)?);
+        tuned.settled.extend(trial.compare(&tuned.features, &case.object)?);
     }
     Ok(tuned)
 }
 
-/// What is measured: a bench, and a setting.
-#[derive(Clone, Copy)]
-struct Case<'a> {
-    /// The bench; that of the graph if it is `None`.
-    bench: Option<&'a PathBuf>,
-    /// A change of the graph or of the bench.
-    also: Option<&'a str>,
+/// What is measured: a graph on a bench, with a setting.
+struct Case {
+    request: Request,
+    /// The file of the bench.
+    file: Option<PathBuf>,
+    object: String,
 }
 
-/// Returns what is measured: each bench as it is, and with each of the settings.
-fn cases(args: &TuneArgs) -> Vec<Case<'_>> {
+impl Case {
+    /// Returns its contact, whose features are not known yet.
+    fn contact(&self) -> Contact {
+        Contact { object: self.object.clone(), latency_ms: 0.0, features: BTreeMap::new() }
+    }
+}
+
+/// Returns what is measured: each bench as it is, and with each of the settings. Simulated devices run long enough.
+fn cases(args: &TuneArgs, request: &Request, shell: &Shell) -> Result<Vec<Case>, String> {
     let benches = [None].into_iter().chain(args.others.iter().map(Some));
-    let settings = || [None].into_iter().chain(args.also.iter().map(|also| Some(also.as_str())));
-    benches.flat_map(|bench| settings().map(move |also| Case { bench, also })).collect()
-}
-
-/// Returns the request for a case with the file of its bench, and lets simulated devices run long enough.
-fn on_bench(request: &Request, case: &Case<'_>, shell: &Shell) -> Result<(Request, Option<PathBuf>), String> {
-    let mut request = Request { bench: case.bench.cloned().or_else(|| request.bench.clone()), ..request.clone() };
-    request.set.extend(case.also.map(str::to_owned));
-    let compiled = compile(shell.catalogue(), &request).map_err(|report| report.render(false))?;
-    request.set.extend(experiment::long_enough(compiled.outline(), experiment::duration(compiled.outline().period_s)));
-    Ok((request, bench_file(compiled.outline())))
+    let settings = || [None].into_iter().chain(args.also.iter().map(Some));
+    let each = benches.flat_map(|bench| settings().map(move |also| (bench, also)));
+    each.map(|(bench, also)| {
+        let mut request = Request { bench: bench.cloned().or_else(|| request.bench.clone()), ..request.clone() };
+        request.set.extend(also.cloned());
+        let compiled = compile(shell.catalogue(), &request).map_err(|report| report.render(false))?;
+        let outline = compiled.outline();
+        request.set.extend(experiment::long_enough(outline, experiment::duration(outline.period_s)));
+        let file = bench_file(outline);
+        let stem = file.as_ref().and_then(|file| file.file_stem()).map(|stem| stem.to_string_lossy().into_owned());
+        let with = also.map_or_else(String::new, |set| format!(" with {set}"));
+        Ok(Case { request, file, object: stem.unwrap_or_else(|| "object".into()) + &with })
+    })
+    .collect()
 }
 
 /// Returns the file of the bench that a request uses, as the places of its devices say.
@@ -286,6 +292,16 @@ fn bench_file(outline: &Outline) -> Option<PathBuf> {
 /// Returns the name of what a feature measures.
 fn quantity(feature: &Feature) -> String {
     feature.quantity().unwrap_or(&feature.name).to_owned()
+}
+
+/// Ratio of the proposed gains to those of the graph from which on a loop is measured again, with the proposed ones [1].
+const FAR: f64 = 2.0;
+
+impl TunedFeature {
+    /// Returns the proposed gains as a multiple of those of the graph.
+    fn factor(&self) -> Option<f64> {
+        self.new.map(|new| new[0] / self.old[0])
+    }
 }
 
 /// Part of the answer by geometry below which a contact sticks [1].
@@ -346,7 +362,7 @@ fn sticks(quantity: &str, component: usize, fit: &Fit) -> bool {
 
 /// Returns the response of what the graph states, at half of the gains and for one component alone.
 fn known(feature: &Feature, component: usize, period: f64) -> impl Fn(f64) -> nalgebra::Complex<f64> {
-    let around = Loop::new(feature, &Answer::default(), 0.0, period).times(0.5);
+    let around = Loop::new(feature, &Answer::default(), 0.0, period).times(HALF);
     let column = feature.column[component];
     move |omega| around.known(omega) * column
 }

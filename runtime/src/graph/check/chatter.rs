@@ -65,7 +65,7 @@ impl Step<'_> {
     }
 }
 
-/// Returns the rings of two modes, then those of three. Each begins with that of its modes that comes first in the file.
+/// Returns the rings of two modes, then those of three. Each begins with the first of its modes in the file.
 fn rings(modes: &[PlannedMode]) -> Vec<Vec<Step<'_>>> {
     let mut rings = Vec::new();
     (0..modes.len()).for_each(|from| add_rings(modes, from, &mut Vec::new(), &mut rings));

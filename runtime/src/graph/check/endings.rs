@@ -74,10 +74,11 @@ impl<'a> Endings<'a> {
         self.drives.commands(generator).all(|wire| arms.contains(&wire.role))
     }
 
-    /// Returns for each mode whether modes that can follow each other without a contact lead to it and away from it
-    /// without end. Few modes do, so a search for cycles among them is short.
+    /// Returns for each mode whether modes that may follow each other without a contact lead to it and away from it
+    /// without end. Few modes do, so a search for cycles among them is short. That search also asks which `on_lost`
+    /// comes first.
     pub(super) fn find_cycling(&self) -> Vec<bool> {
-        let next: Vec<Vec<usize>> = (0..self.modes.len()).map(|mode| self.followers(mode).collect()).collect();
+        let next: Vec<Vec<usize>> = (0..self.modes.len()).map(|mode| self.followers(mode, &[]).collect()).collect();
         let mut entries = vec![0_usize; next.len()];
         next.iter().flatten().for_each(|to| entries[*to] += 1);
         // Modes that nothing leads to are on no cycle.
@@ -95,12 +96,13 @@ impl<'a> Endings<'a> {
         is_cycling
     }
 
-    /// Returns the modes, from `mode` back to itself, that can follow each other without a contact.
+    /// Returns the modes, from `mode` back to itself, that can follow each other without a contact of the arms that its
+    /// generators move.
     pub(super) fn find_cycle(&self, mode: usize, is_cycling: &[bool]) -> Option<Vec<usize>> {
         let mut paths = if is_cycling[mode] { vec![vec![mode]] } else { Vec::new() };
         let mut reached = BTreeSet::new();
         while let Some(path) = paths.pop() {
-            for to in path.last().into_iter().flat_map(|last| self.followers(*last)) {
+            for to in path.last().into_iter().flat_map(|last| self.followers(*last, self.generators[mode])) {
                 if to == mode {
                     return Some(path);
                 }
@@ -112,18 +114,20 @@ impl<'a> Endings<'a> {
         None
     }
 
-    /// Returns the modes that can follow a mode without a contact.
-    fn followers(&self, mode: usize) -> impl Iterator<Item = usize> {
-        self.modes[mode].exits.iter().filter(move |exit| self.is_free(exit, mode)).filter_map(|exit| exit.to)
+    /// Returns the modes that can follow a mode without a contact of the arms that the generators `moved` move. Another
+    /// arm may have its contact all the time.
+    fn followers(&self, mode: usize, moved: &'a [usize]) -> impl Iterator<Item = usize> {
+        self.modes[mode].exits.iter().filter(move |exit| self.is_free(exit, mode, moved)).filter_map(|exit| exit.to)
     }
 
-    /// Returns whether an exit can be taken again and again without a contact and without the operator.
-    fn is_free(&self, exit: &PlannedExit, mode: usize) -> bool {
+    /// Returns whether an exit can be taken again and again without the operator, and without a contact of the arms
+    /// that the generators `moved` move.
+    fn is_free(&self, exit: &PlannedExit, mode: usize, moved: &[usize]) -> bool {
         match &exit.condition {
             Condition::Sent(_) => false,
             Condition::Elapsed(time) => {
                 let is_late = self.ends_of(mode).any(|end| matches!(end, Condition::Elapsed(at) if at <= time));
-                !is_late && !self.is_lost_before(exit, *time, mode)
+                !is_late && !self.is_lost_before(*time, mode, moved)
             }
             Condition::Travel(pose, way) => {
                 self.ends_of(mode).all(|end| !matches!(end, Condition::Travel(of, at) if of == pose && at <= way))
@@ -134,16 +138,12 @@ impl<'a> Endings<'a> {
         }
     }
 
-    /// Returns whether the loss of a contact ends a mode before an exit that is taken after `time` [ns]. At the same time,
-    /// `on_lost` wins.
-    ///
-    /// The contact must be that of each arm that moves in the mode or in the next one: a sensor on another arm may have
-    /// its contact all the time.
-    fn is_lost_before(&self, exit: &PlannedExit, time: i64, mode: usize) -> bool {
-        let generators = || [Some(mode), exit.to].into_iter().flatten().flat_map(|mode| self.generators[mode]);
+    /// Returns whether the loss of the contact of the arms that `moved` moves ends a mode before an exit that is taken
+    /// after `time` [ns]. If both times are equal, `on_lost` wins.
+    fn is_lost_before(&self, time: i64, mode: usize, moved: &[usize]) -> bool {
         let is_before = |lost: &&PlannedExit| matches!(lost.condition, Condition::Lost(_, at) if at <= time);
         let mut losses = self.modes[mode].exits.iter().filter(is_before);
-        generators().next().is_some() && losses.any(|lost| generators().all(|node| self.ends(lost, *node)))
+        !moved.is_empty() && losses.any(|lost| moved.iter().all(|node| self.ends(lost, *node)))
     }
 
     /// Returns the conditions on which a mode ends the run.
