@@ -210,7 +210,10 @@ fn poor_gains() -> Vec<(&'static str, Variant)> {
         // Contacts that cannot be read check nothing.
         (
             "unusual-value",
-            variant("hybrid", &["set facts.arm.contacts=[{ object = \"ball\", pressure = { vz = 10.0, resonance = 5.0 } }]"]),
+            variant(
+                "hybrid",
+                &["set facts.arm.contacts=[{ object = \"ball\", pressure = { vz = 10.0, resonance = 5.0 } }]"],
+            ),
         ),
     ]
 }
