@@ -133,6 +133,19 @@ fn poor_behind_nodes() -> Vec<(&'static str, Variant)> {
         ("low-margin", with(feature("touch.present"), &["gains.x = { kp = 17.5 }"])),
         ("unfiltered-derivative", with(feature("touch.present"), &["gains.x = { kp = 3.5, kd = 0.1 }"])),
         ("unused-column", other("no.is_met")),
+        // A delay smooths nothing.
+        (
+            "unfiltered-derivative",
+            with(
+                vec!["gains.x = { kp = 3.5, kd = 0.1 }".to_owned()],
+                &[
+                    "set nodes.late.type=\"delay\"",
+                    "set nodes.late.unit=\"m\"",
+                    "set nodes.late.in.value=\"touch.x\"",
+                    "set nodes.error.in.x=\"late.value\"",
+                ],
+            ),
+        ),
         ("unused-column", with(feature("modes.approach"), &[])),
     ]
 }
@@ -291,6 +304,52 @@ fn scaled(task: &'static str, factor: f64) -> Vec<String> {
     text.lines().filter(|line| line.starts_with("gains.")).map(scale).collect()
 }
 
+/// Good controllers with loops through a delay, and with sides of a switch that other modes use.
+fn good_behind_nodes() -> Vec<Variant> {
+    vec![
+        // The last value is held through a delay, which closes a loop.
+        variant(
+            "hybrid",
+            &[
+                "set nodes.held.type=\"switch\"",
+                "set nodes.held.in.on=\"touch.x\"",
+                "set nodes.held.in.off=\"old.value\"",
+                "set nodes.held.in.select=\"touch.present\"",
+                "set nodes.error.in.x=\"held.value\"",
+                "set nodes.old.type=\"delay\"",
+                "set nodes.old.unit=\"m\"",
+                "set nodes.old.in.value=\"held.value\"",
+            ],
+        ),
+        variant(
+            "hybrid",
+            &[
+                "set nodes.held.type=\"twist_switch\"",
+                "set nodes.held.in.on=\"projector.twist\"",
+                "set nodes.held.in.off=\"old.value\"",
+                "set nodes.held.in.select=\"touch.present\"",
+                "set nodes.sum.in.touch=\"held.value\"",
+                "set nodes.old.type=\"twist_delay\"",
+                "set nodes.old.in.value=\"held.value\"",
+            ],
+        ),
+        // A slow side of a switch that only another mode uses.
+        variant(
+            "hybrid",
+            &[
+                "set nodes.slow.type=\"low_pass\"",
+                "set nodes.slow.in.value=\"touch.x\"",
+                "set nodes.slow.time_constant_ms=800",
+                "set nodes.held.type=\"switch\"",
+                "set nodes.held.in.on=\"touch.x\"",
+                "set nodes.held.in.off=\"slow.value\"",
+                "set nodes.held.in.select=\"modes.servo\"",
+                "set nodes.error.in.x=\"held.value\"",
+            ],
+        ),
+    ]
+}
+
 /// Controllers as an integrator may write them.
 fn good() -> Vec<Variant> {
     let mut all = Vec::new();
@@ -364,7 +423,7 @@ fn good() -> Vec<Variant> {
 
 #[test]
 fn no_good_controller_is_blamed() {
-    let good = good();
+    let good = [good(), good_behind_nodes()].into_iter().flatten().collect::<Vec<_>>();
     assert!(good.len() > 60, "{}", good.len());
     let reports = good.iter().filter_map(|variant| Some((variant, variant.warnings()?)));
     let wrong: Vec<String> = reports

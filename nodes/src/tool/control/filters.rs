@@ -35,29 +35,49 @@ impl Way {
     }
 }
 
-/// Follows a feature back to its measurement. Of the two sides of a `switch`, the slower one counts.
+/// Follows a feature back to its measurement.
 pub(super) fn way(nodes: &Nodes<'_>, port: &str) -> Way {
-    let measured = || Way { measured: port.to_owned(), ..Way::default() };
+    follow(nodes, port, &mut Vec::new()).unwrap_or_else(|| Way { measured: port.to_owned(), ..Way::default() })
+}
+
+/// Follows a port back to a measurement; `None` if it leads back to a node of the path, through a `delay`.
+fn follow<'a>(nodes: &Nodes<'a>, port: &str, path: &mut Vec<&'a str>) -> Option<Way> {
+    let measured = || Some(Way { measured: port.to_owned(), ..Way::default() });
     let Some(node) = nodes.writer(port) else { return measured() };
-    match node.kind.text.as_str() {
+    if path.contains(&&*node.name) {
+        return None;
+    }
+    path.push(&node.name);
+    let found = match node.kind.text.as_str() {
         "switch" => {
-            let sides = ["on", "off"].into_iter().filter_map(|side| Some(way(nodes, source(node, side)?)));
-            sides.max_by(|one, other| one.delay().total_cmp(&other.delay())).unwrap_or_else(measured)
+            let sides: Vec<Way> = nodes.sides(node).filter_map(|side| follow(nodes, side, path)).collect();
+            slower(sides)
         }
-        "gate" => {
-            let Some(value) = source(node, "value") else { return measured() };
-            let mut found = way(nodes, value);
+        "gate" => source(node, "value").map_or_else(measured, |value| {
+            let mut found = follow(nodes, value, path)?;
             found.gates.extend(source(node, "gate").map(str::to_owned));
-            found
-        }
-        kind => {
-            let Some((shape, value)) = shape(nodes, node).zip(source(node, "value")) else { return measured() };
-            let mut found = way(nodes, value);
+            Some(found)
+        }),
+        kind => shape(nodes, node).zip(source(node, "value")).map_or_else(measured, |(shape, value)| {
+            let mut found = follow(nodes, value, path)?;
             let delay_s = shape.delay(nodes.period());
             found.filters.push(Filter { node: node.name.clone(), kind: kind.to_owned(), delay_s, shape });
-            found
-        }
-    }
+            Some(found)
+        }),
+    };
+    path.pop();
+    found
+}
+
+/// Returns the slower one of two sides, with the gates of both.
+fn slower(sides: Vec<Way>) -> Option<Way> {
+    let is_everywhere = |gate: &String| sides.iter().all(|side| side.gates.contains(gate));
+    let slowest = sides.iter().max_by(|one, other| one.delay().total_cmp(&other.delay()))?;
+    Some(Way {
+        measured: slowest.measured.clone(),
+        filters: slowest.filters.clone(),
+        gates: slowest.gates.iter().filter(|gate| is_everywhere(gate)).cloned().collect(),
+    })
 }
 
 /// Returns the filter that a node is.

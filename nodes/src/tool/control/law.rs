@@ -112,6 +112,12 @@ impl Feature {
         }
     }
 
+    /// Returns the delay of the filters that smooth it [s].
+    pub(crate) fn smoothing(&self) -> f64 {
+        let smooth = self.filters.iter().filter(|filter| !matches!(filter.shape, Shape::Delay { .. }));
+        smooth.map(|filter| filter.delay_s).sum()
+    }
+
     /// Returns the delay of all filters [s].
     pub(crate) fn delay(&self) -> f64 {
         self.filters.iter().map(|filter| filter.delay_s).sum()
@@ -121,29 +127,28 @@ impl Feature {
 /// Returns what the twist of a port is made of.
 pub(crate) fn law(nodes: &Nodes<'_>, port: &str) -> Law {
     let mut law = Law::default();
-    collect(nodes, port, [true; 6], &mut law);
+    collect(nodes, port, [true; 6], &mut law, &mut Vec::new());
     law
 }
 
-fn collect(nodes: &Nodes<'_>, port: &str, passes: [bool; 6], law: &mut Law) {
-    let Some(node) = nodes.writer(port) else { return };
+/// Adds what moves a twist. A port that leads back to a node of the path, through a `twist_delay`, adds nothing.
+fn collect<'a>(nodes: &Nodes<'a>, port: &str, passes: [bool; 6], law: &mut Law, path: &mut Vec<&'a str>) {
+    let Some(node) = nodes.writer(port).filter(|node| !path.contains(&&*node.name)) else { return };
+    path.push(&node.name);
     let masked = |values: [f64; 6]| std::array::from_fn(|i| if passes[i] { values[i] } else { 0.0 });
     match node.kind.text.as_str() {
-        "twist_adder" => node.wires.iter().for_each(|wire| collect(nodes, &wire.source, passes, law)),
+        "twist_adder" => node.wires.iter().for_each(|wire| collect(nodes, &wire.source, passes, law, path)),
         "projector" => {
             let select: [f64; 6] =
                 nodes.value(node, "select").and_then(|select| select.value.read()).unwrap_or_default();
             let passes = std::array::from_fn(|i| passes[i] && select[i] != 0.0);
-            source(node, "twist").into_iter().for_each(|twist| collect(nodes, twist, passes, law));
+            source(node, "twist").into_iter().for_each(|twist| collect(nodes, twist, passes, law, path));
         }
-        "pivot" => source(node, "twist").into_iter().for_each(|twist| collect(nodes, twist, passes, law)),
-        "twist_switch" => {
-            let sides = ["on", "off"].into_iter().filter_map(|side| source(node, side));
-            sides.for_each(|side| collect(nodes, side, passes, law));
-        }
+        "pivot" => source(node, "twist").into_iter().for_each(|twist| collect(nodes, twist, passes, law, path)),
+        "twist_switch" => nodes.sides(node).for_each(|side| collect(nodes, side, passes, law, path)),
         "twist_gate" | "twist_delay" => {
             let before = law.features.len();
-            source(node, "value").into_iter().for_each(|twist| collect(nodes, twist, passes, law));
+            source(node, "value").into_iter().for_each(|twist| collect(nodes, twist, passes, law, path));
             law.features[before..].iter_mut().for_each(|feature| feature.pass(nodes, node));
         }
         "compose_twist" => {
@@ -167,6 +172,14 @@ fn collect(nodes: &Nodes<'_>, port: &str, passes: [bool; 6], law: &mut Law) {
         }
         kind => law.guidance.push(Guidance { port: port.to_owned(), kind: kind.to_owned(), passes }),
     }
+    path.pop();
+}
+
+/// Returns the setpoint of a feature in a node that compares it.
+pub(crate) fn setpoint(nodes: &Nodes<'_>, compared: &str, feature: &str) -> Option<f64> {
+    let node = nodes.node(compared)?;
+    let one = nodes.number(node, &format!("setpoint.{feature}"));
+    one.or_else(|| nodes.value(node, "setpoint")?.value.as_table()?.get(feature)?.read())
 }
 
 /// Follows a feature from its column back to its measurement.
@@ -179,11 +192,7 @@ fn feature(nodes: &Nodes<'_>, jacobian: &OutlinedBlock, name: String, column: [f
     let gain = |which: &str| pid.and_then(|pid| nodes.number(pid, &format!("gains.{name}.{which}"))).unwrap_or(0.0);
     let behind = pid.map(|pid| before(pid, "error", "deadband").unwrap_or(pid));
     let error = behind.and_then(|node| before(node, "error", "feature_error"));
-    let setpoint = error.and_then(|error| {
-        let one = nodes.number(error, &format!("setpoint.{name}"));
-        let table = || nodes.value(error, "setpoint")?.value.as_table()?.get(&name)?.read();
-        one.or_else(table)
-    });
+    let setpoint = error.and_then(|error| setpoint(nodes, &error.name, &name));
     let way = error.and_then(|error| source(error, &name)).map(|port| way(nodes, port));
     let measured = way.as_ref().map(|way| way.measured.clone());
     let (filters, gates) = way.map(|way| (way.filters, way.gates)).unwrap_or_default();

@@ -6,7 +6,8 @@
 //!
 //! K is the `pid`, c the column behind all projectors, J the answer of the feature to the motion of the sensor, A the
 //! resonance of arm and contact, and F the filters. A command is held for one period, and T / (z - 1) is the travel at
-//! the samples: exact up to half of the rate of the graph, where the resonance leaves nothing of the motion. Not in it: limits, dry friction, hysteresis, and what one feature does to another.
+//! the samples, exact up to half of the rate of the graph if the arm is stiff. Not in it: limits, dry friction,
+//! hysteresis, and what one feature does to another.
 
 use nalgebra::Complex;
 

@@ -64,6 +64,19 @@ impl<'a> Nodes<'a> {
         self.index.nodes.get(name).copied()
     }
 
+    /// Returns whether a flag is set in this mode, if it is the flag of a mode.
+    pub(crate) fn is_set(&self, flag: &str) -> Option<bool> {
+        let mode = self.index.outline.modes.iter().find(|mode| flag == mode_flag(&mode.name))?;
+        Some(self.mode.is_some_and(|own| own.name == mode.name))
+    }
+
+    /// Returns the ports that a switch passes in this mode.
+    pub(crate) fn sides(&self, switch: &'a OutlinedBlock) -> impl Iterator<Item = &'a str> {
+        let set = source(switch, "select").and_then(|flag| self.is_set(flag));
+        let sides = [("on", true), ("off", false)].into_iter().filter(move |(_, on)| set.is_none_or(|set| set == *on));
+        sides.filter_map(|(side, _)| source(switch, side))
+    }
+
     /// Returns the nominal time between two ticks [s].
     pub(crate) const fn period(&self) -> f64 {
         self.index.outline.period_s
@@ -91,6 +104,14 @@ impl<'a> Nodes<'a> {
     /// Returns a number of a node in this mode.
     pub(crate) fn number(&self, node: &'a OutlinedBlock, path: &str) -> Option<f64> {
         self.value(node, path)?.value.read()
+    }
+}
+
+/// Returns the port that is set in a mode: `modes.NAME`, and `TASK.modes.NAME` in a task that is a part.
+pub(crate) fn mode_flag(name: &str) -> String {
+    match name.rsplit_once('.') {
+        Some((task, name)) => format!("{task}.modes.{name}"),
+        None => format!("modes.{name}"),
     }
 }
 

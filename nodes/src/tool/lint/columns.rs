@@ -76,7 +76,7 @@ fn reversed(arm: &Controlled<'_>, mode: &ModeLaw<'_>, feature: &Feature) -> Opti
 fn blocked(mode: &ModeLaw<'_>, feature: &Feature, row: &Row) -> Diagnostic {
     let name = &feature.name;
     let message = format!(
-        "{}the projector leaves only {} of the column of `{name}`, which does not change `{name}`",
+        "{}the projector leaves only {} of the column of `{name}`, which does not change `{name}` in a known direction",
         mode.named(),
         moved(&feature.column)
     );
@@ -157,8 +157,9 @@ fn projectors<'a>(nodes: &Nodes<'a>, port: &str) -> Vec<&'a OutlinedBlock> {
     };
     match node.kind.text.as_str() {
         "twist_adder" => node.wires.iter().flat_map(|wire| projectors(nodes, &wire.source)).collect(),
-        "twist_switch" => all(&["on", "off"]),
-        "twist_gate" | "twist_delay" => all(&["value"]),
+        "twist_switch" => nodes.sides(node).flat_map(|side| projectors(nodes, side)).collect(),
+        // Not through a `twist_delay`, which can close a loop.
+        "twist_gate" => all(&["value"]),
         "pivot" => all(&["twist"]),
         "projector" => [vec![node], all(&["twist"])].concat(),
         _ => Vec::new(),
@@ -215,6 +216,9 @@ fn unused(arm: &Controlled<'_>) -> Diagnostics {
     let dead = features.filter(|feature| !controls(feature) && !is_along_line(arm, feature));
     let found = dead.filter_map(|feature| {
         let column = first.column(feature)?;
+        // Of the components of the column, those that change the feature.
+        let row = first.quantity(feature).and_then(Row::of).filter(|row| row.changes(&column));
+        let answers = row.map(|row| row.components(" or "));
         let (message, help) = match column == [0.0; 6] {
             true => (
                 format!("the column of `{}` is zero, so its gains do nothing", feature.name),
@@ -222,7 +226,7 @@ fn unused(arm: &Controlled<'_>) -> Diagnostics {
             ),
             false => (
                 format!("no mode selects a component of the column of `{}`, so its gains do nothing", feature.name),
-                format!("select {} in a projector, or remove the feature", moved(&column)),
+                format!("select {} in a projector, or remove the feature", answers.unwrap_or_else(|| moved(&column))),
             ),
         };
         Some(Diagnostic::new(Code::UnusedColumn, first.place_of_column(feature), message).help(help))

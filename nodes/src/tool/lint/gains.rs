@@ -21,7 +21,7 @@ fn unfiltered(mode: &ModeLaw<'_>, feature: &Feature) -> Option<Diagnostic> {
     // The difference of two samples has √2 times their noise.
     let factor = 2.0_f64.sqrt() * feature.kd / period;
     // A filter of less than a period smooths nothing, and a share below that of `kp` does no harm.
-    if feature.delay() >= period || factor <= feature.kp {
+    if feature.smoothing() >= period || factor <= feature.kp {
         return None;
     }
     mode.quantity(feature)?;
@@ -73,8 +73,9 @@ fn windup(arm: &Controlled<'_>, mode: &ModeLaw<'_>, feature: &Feature) -> Option
          the object is far, and overshoots"
     );
     let full = (full * 1e3).round() / 1e3;
+    let within = if number("within").is_some() { "a smaller `within`" } else { "`within`" };
     let help = format!(
-        "write `within` in the gains of `{name}`, about five times its noise, or a `limit` below {full}, where the motion \
+        "write {within} in the gains of `{name}`, about five times its noise, or a `limit` below {full}, where the motion \
          reaches its limit"
     );
     Some(Diagnostic::new(Code::Windup, mode.place_of_gain(feature, "ki"), message).help(help))

@@ -11,11 +11,11 @@ pub(super) fn check(arm: &Controlled<'_>, found: &mut Diagnostics) {
     let passes = |wanted: &Feature| {
         let each = arm.modes.iter().flat_map(|mode| mode.moving().map(move |feature| (mode, feature)));
         each.filter(|(_, feature)| feature.name == wanted.name && feature.pid == wanted.pid)
-            .any(|(mode, feature)| barred(arm, mode, feature).is_none())
+            .any(|(mode, feature)| barred(mode, feature).is_none())
     };
     for mode in &arm.modes {
         for feature in mode.moving().filter(|feature| !passes(feature)) {
-            let Some((gate, why)) = barred(arm, mode, feature) else { continue };
+            let Some((gate, why)) = barred(mode, feature) else { continue };
             let message = format!("`{}` has gains, but it is never present: it passes `{gate}`, {why}", feature.name);
             let help =
                 format!("let a gate of `{}` open in a mode that selects its column, or remove its gains", feature.name);
@@ -25,26 +25,12 @@ pub(super) fn check(arm: &Controlled<'_>, found: &mut Diagnostics) {
 }
 
 /// Returns the flag that keeps a feature from moving the sensor in a mode, and why.
-fn barred<'f>(arm: &Controlled<'_>, mode: &ModeLaw<'_>, feature: &'f Feature) -> Option<(&'f str, String)> {
-    let own = mode.mode.map(|mode| &*mode.name);
-    feature.gates.iter().find_map(|gate| {
-        let other = arm.outline.modes.iter().find(|other| *gate == mode_flag(&other.name));
-        match other {
-            Some(other) if Some(&*other.name) != own => {
-                Some((&**gate, format!("which is set in the mode `{}` only", other.name)))
-            }
-            Some(_) => None,
-            None => is_without_contact(mode, gate).then(|| (&**gate, "which is set without a contact only".to_owned())),
-        }
+fn barred<'f>(mode: &ModeLaw<'_>, feature: &'f Feature) -> Option<(&'f str, String)> {
+    feature.gates.iter().find_map(|gate| match mode.nodes.is_set(gate) {
+        Some(true) => None,
+        Some(false) => Some((&**gate, "which is set in another mode only".to_owned())),
+        None => is_without_contact(mode, gate).then(|| (&**gate, "which is set without a contact only".to_owned())),
     })
-}
-
-/// Returns the port that is set in a mode: `modes.NAME`, and `TASK.modes.NAME` in a task that is a part.
-fn mode_flag(name: &str) -> String {
-    match name.rsplit_once('.') {
-        Some((task, name)) => format!("{task}.modes.{name}"),
-        None => format!("modes.{name}"),
-    }
 }
 
 /// Returns whether a flag is the opposite of a contact.

@@ -85,7 +85,8 @@ fn judge(mode: &ModeLaw<'_>, feature: &Feature, contacts: &[Contact]) -> Option<
     let low = worst(&|found| !KEPT.holds(&found.margins));
     let slow = worst(&|found| is_slow(&found.margins, found.lag)).filter(|_| low.is_none() || feature.delay() > SLOW);
     match (slow, low) {
-        (Some(slow), _) => slow_filter(mode, feature, contacts, slow),
+        (Some(slow), low) => slow_filter(mode, feature, contacts, slow)
+            .or_else(|| Some(low_margin(mode, feature, &loops, low.unwrap_or(slow)))),
         (_, Some(low)) => Some(low_margin(mode, feature, &loops, low)),
         _ => None,
     }

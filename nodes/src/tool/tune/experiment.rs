@@ -87,7 +87,7 @@ pub(super) struct Experiment<'a> {
     pub(super) share: f64,
 }
 
-/// Share of the gains of which the response is told, and with which a loop is measured first [1].
+/// Share of the gains for which the response holds, and with which a loop is measured first [1].
 pub(super) const HALF: f64 = 0.5;
 
 /// The response at one frequency.
@@ -195,7 +195,7 @@ impl Experiment<'_> {
         let all = find(&engine, format!("{}.twist.{}", self.adder, COMPONENTS[self.component]))?;
         let sines = Sine::all(self.period);
         let wanted = sines.last().map_or(0, Sine::end);
-        let mut stay = Stay::new(&self.mode.name, settling(self.period), wanted);
+        let mut stay = Stay::new(self.mode.name.clone(), settling(self.period), wanted);
         let options = RunOptions { duration: Some(duration(self.period)), ..RunOptions::default() };
         let column = self.feature.column[self.component];
         let outcome = run(&mut engine, &options, &mut |engine| {
@@ -203,7 +203,7 @@ impl Experiment<'_> {
             stay.see(engine.mode(), || [read(control) * column, read(all)]);
         });
         let outcome = outcome.map_err(|error| format!("the run cannot start: {error}"))?;
-        let (rows, left) = stay.end();
+        let (rows, left) = (stay.rows(), stay.left());
         Ok(match (&outcome.end, left) {
             (End::Interrupted, _) => Answered::Interrupted,
             (End::Fault(fault), _) => Answered::Nothing(fault.to_string()),
@@ -215,7 +215,7 @@ impl Experiment<'_> {
             _ if rows[sines[0].begin..].iter().flatten().any(|value| !value.is_finite()) => {
                 Answered::Nothing(format!("`{}` was absent for a while", self.feature.name))
             }
-            _ => Answered::Lines(sines.iter().map(|sine| self.line(&rows, sine)).collect()),
+            _ => Answered::Lines(sines.iter().map(|sine| self.line(rows, sine)).collect()),
         })
     }
 

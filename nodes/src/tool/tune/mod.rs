@@ -1,6 +1,7 @@
 //! `tactflow tune`: measures how the features answer, and proposes gains with margins.
 
 mod bode;
+mod course;
 mod experiment;
 mod fit;
 mod lift;
@@ -45,8 +46,8 @@ ways. All limits of the graph hold. From the answers it fits a gain, a resonance
 proposes the largest gains that keep the margins over all contacts. Then it runs the task with them, and compares.
 
 Examples:
-  tactflow tune graphs/hybrid.toml
-  tactflow tune graphs/hybrid.toml --feature pressure --with graphs/benches/pen.toml --with graphs/benches/toy_box.toml
+  tactflow tune graphs/force.toml
+  tactflow tune graphs/force.toml --with graphs/benches/pen.toml --with graphs/benches/toy_box.toml
   tactflow tune graphs/force.toml --also nodes.error.setpoint.pressure=0.05  at another setpoint too
   tactflow tune graphs/edge.toml --svg bode.svg  draw the loops as a Bode plot
   tactflow tune graphs/force.toml --save        write the gains into the graph, and the contacts into the benches
@@ -231,9 +232,10 @@ fn tune(args: &TuneArgs, shell: &Shell, request: &Request, outline: &Outline) ->
         // A loop with very different gains says little about the frequencies that count.
         features.push(match first.factor().filter(|factor| !(1.0 / FAR..=FAR).contains(factor)) {
             Some(factor) => {
-                let name = &feature.name;
-                shell.say_beside(&format!("`{name}`: again, with half of {factor:.1} times the gains"));
-                measure(HALF * factor)?
+                let (name, times) = (&feature.name, page::rounded(factor));
+                shell.say_beside(&format!("`{name}`: again, with half of {times} times the gains"));
+                let again = measure(HALF * factor)?;
+                if again.new.is_some() { again } else { first }
             }
             None => first,
         });
@@ -244,6 +246,9 @@ fn tune(args: &TuneArgs, shell: &Shell, request: &Request, outline: &Outline) ->
     for case in &cases {
         let mut request = case.request.clone();
         request.set.extend(lift::settings(outline, mode, &adder, experiment::measured(outline.period_s)));
+        // With another setting, the mode and its setpoints may be others.
+        let outline = &case.outline;
+        let mode = outline.modes.iter().find(|one| one.name == mode.name).unwrap_or(mode);
         let trial = Trial { catalogue: shell.catalogue(), request: &request, outline, mode };
         tuned.settled.extend(trial.compare(&tuned.features, &case.object)?);
     }
@@ -253,6 +258,7 @@ fn tune(args: &TuneArgs, shell: &Shell, request: &Request, outline: &Outline) ->
 /// What is measured: a graph on a bench, with a setting.
 struct Case {
     request: Request,
+    outline: Outline,
     /// The file of the bench.
     file: Option<PathBuf>,
     object: String,
@@ -279,7 +285,8 @@ fn cases(args: &TuneArgs, request: &Request, shell: &Shell) -> Result<Vec<Case>,
         let file = bench_file(outline);
         let stem = file.as_ref().and_then(|file| file.file_stem()).map(|stem| stem.to_string_lossy().into_owned());
         let with = also.map_or_else(String::new, |set| format!(" with {set}"));
-        Ok(Case { request, file, object: stem.unwrap_or_else(|| "object".into()) + &with })
+        let outline = outline.clone();
+        Ok(Case { request, outline, file, object: stem.unwrap_or_else(|| "object".into()) + &with })
     })
     .collect()
 }

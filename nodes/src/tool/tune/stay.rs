@@ -5,8 +5,8 @@
 /// A pad can bounce at the first touch. So the mode may be left and entered again while the contact settles, and the
 /// rows begin again.
 #[derive(Debug)]
-pub(super) struct Stay<'a, R> {
-    mode: &'a str,
+pub(super) struct Stay<R> {
+    mode: String,
     /// Number of ticks in which the contact settles.
     settling: usize,
     /// Number of rows after which the mode may be left.
@@ -15,8 +15,8 @@ pub(super) struct Stay<'a, R> {
     left: Option<String>,
 }
 
-impl<'a, R> Stay<'a, R> {
-    pub(super) const fn new(mode: &'a str, settling: usize, wanted: usize) -> Self {
+impl<R> Stay<R> {
+    pub(super) const fn new(mode: String, settling: usize, wanted: usize) -> Self {
         Self { mode, settling, wanted, rows: Vec::new(), left: None }
     }
 
@@ -25,7 +25,7 @@ impl<'a, R> Stay<'a, R> {
         if self.rows.len() >= self.wanted {
             return;
         }
-        if now != Some(self.mode) {
+        if now != Some(&self.mode) {
             if !self.rows.is_empty() && self.left.is_none() {
                 self.left = Some(now.unwrap_or("the end").to_owned());
             }
@@ -40,9 +40,14 @@ impl<'a, R> Stay<'a, R> {
         }
     }
 
-    /// Returns the rows, and the mode to which the task went before there were enough of them.
-    pub(super) fn end(self) -> (Vec<R>, Option<String>) {
-        (self.rows, self.left)
+    /// Returns the rows.
+    pub(super) fn rows(&self) -> &[R] {
+        &self.rows
+    }
+
+    /// Returns the mode to which the task went before there were enough rows.
+    pub(super) fn left(&self) -> Option<&str> {
+        self.left.as_deref()
     }
 }
 
@@ -52,12 +57,12 @@ mod tests {
 
     /// Returns the ticks that count of a task that is in these modes, and the mode to which it went too early.
     fn stay(modes: &str) -> (Vec<usize>, Option<String>) {
-        let mut stay = Stay::new("s", 3, 6);
+        let mut stay = Stay::new("s".to_owned(), 3, 6);
         for (tick, mode) in modes.char_indices() {
             let mode = mode.to_string();
             stay.see((mode != "-").then_some(&mode), || tick);
         }
-        stay.end()
+        (stay.rows().to_vec(), stay.left().map(str::to_owned))
     }
 
     #[test]

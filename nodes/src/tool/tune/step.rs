@@ -4,7 +4,8 @@ use serde::Serialize;
 use tactflow_runtime::graph::{Outline, OutlinedMode};
 
 use super::{TunedFeature, lift};
-use crate::tool::control::settings::toml;
+use crate::tool::control::law::setpoint;
+use crate::tool::control::settings::{Index, Nodes, mode_flag, toml};
 
 /// How long a task holds its setpoints before the first step [s].
 pub(super) const BEFORE_S: f64 = 12.0;
@@ -22,10 +23,14 @@ const MEAN_S: f64 = 0.04;
 const FOLLOWED: f64 = 0.9;
 /// Part of the end of a step in which a feature must rest [1].
 const REST: f64 = 0.25;
-/// Largest overshoot, and largest error at the end, of gains that are good [1]. A peak of the sensitivity of 1.7 has an
-/// overshoot of about 0.4.
+/// Largest overshoot, and largest error at the end, of gains that are good whatever the old ones do [1]. A peak of the
+/// sensitivity of 1.7 has an overshoot of about 0.4.
 const MAX_OVERSHOOT: f64 = 0.6;
 const MAX_REST: f64 = 0.3;
+/// Overshoot or error at the end, as a multiple of that with the old gains, from which on it is worse [1].
+const WORSE: f64 = 1.2;
+/// Error before a step, as a share of it, up to which the response to the step says something [1].
+const MAX_ERROR: f64 = 0.2;
 
 /// How a feature follows a step.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
@@ -41,12 +46,18 @@ pub(super) struct Step {
 }
 
 impl Step {
-    /// Returns what a response says: the errors [unit of the feature] after a step of a size, one in each period [s].
-    pub(super) fn of(size: f64, errors: &[f64], period: f64) -> Option<Self> {
+    /// Returns what a response says: the errors [unit of the feature] after a step of a size, one in each period [s], and
+    /// those before it. `None` if the feature was absent for a while, or if it was not held before the step.
+    pub(super) fn of(size: f64, before: &[f64], errors: &[f64], period: f64) -> Option<Self> {
         let window = ((MEAN_S / period).round() as usize).max(1);
-        let values: Vec<f64> = errors.iter().copied().filter(|error| error.is_finite()).collect();
-        let mean = |part: &[f64]| 1.0 - part.iter().sum::<f64>() / part.len() as f64 / size;
-        let followed: Vec<f64> = values.windows(window).map(mean).collect();
+        let is_absent = before.iter().chain(errors).any(|error| !error.is_finite());
+        let rest_before = before.iter().map(|error| error * error).sum::<f64>() / before.len() as f64;
+        if is_absent || before.is_empty() || errors.len() < 2 * window || rest_before.sqrt() > MAX_ERROR * size {
+            return None;
+        }
+        let offset = before.iter().sum::<f64>() / before.len() as f64;
+        let mean = |part: &[f64]| 1.0 - (part.iter().sum::<f64>() / part.len() as f64 - offset) / size;
+        let followed: Vec<f64> = errors.windows(window).map(mean).collect();
         let end = &followed[(followed.len() as f64 * (1.0 - REST)) as usize..];
         let square = end.iter().map(|share| (1.0 - share) * (1.0 - share)).sum::<f64>();
         let most = followed.iter().copied().reduce(f64::max)?;
@@ -59,35 +70,45 @@ impl Step {
         })
     }
 
-    /// Returns what is wrong with a response.
-    pub(super) fn failure(&self) -> Option<String> {
+    /// Returns what is wrong with a response that is worse than the old one.
+    pub(super) fn failure(&self, old: &Self) -> Option<String> {
         let percent = |share: f64| format!("{:.0} %", 100.0 * share);
-        match self {
-            Self { overshoot, .. } if *overshoot > MAX_OVERSHOOT => {
-                Some(format!("after a step of the setpoint it overshoots by {}", percent(*overshoot)))
-            }
-            Self { rest, .. } if *rest > MAX_REST => {
-                Some(format!("it does not settle after a step of the setpoint: the error is {} of it", percent(*rest)))
-            }
-            _ => None,
+        let is_bad = |new: f64, old: f64, most: f64| new > most && new > WORSE * old;
+        if is_bad(self.overshoot, old.overshoot, MAX_OVERSHOOT) {
+            return Some(format!("after a step of the setpoint it overshoots by {}", percent(self.overshoot)));
         }
+        let is_restless = is_bad(self.rest, old.rest, MAX_REST);
+        is_restless.then(|| {
+            format!("it does not settle after a step of the setpoint: the error is {} of the step", percent(self.rest))
+        })
     }
 }
 
-/// Returns the size of the step of each feature; `None` if no step is known, or if a flag of the mode would miss it.
-pub(super) fn sizes(outline: &Outline, mode: &OutlinedMode, features: &[&TunedFeature]) -> Vec<Option<f64>> {
-    let flag = format!("modes.{}", mode.name);
+/// A step of one feature.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Planned {
+    /// The setpoint before it.
+    setpoint: f64,
+    pub(super) size: f64,
+}
+
+/// Returns the step of each feature; `None` if its setpoint is not known, or if a node reads the flag of the mode.
+pub(super) fn plan(outline: &Outline, mode: &OutlinedMode, features: &[&TunedFeature]) -> Vec<Option<Planned>> {
+    let flag = mode_flag(&mode.name);
     let reads_mode = outline.nodes.iter().flat_map(|node| &node.wires).any(|wire| wire.source == flag);
-    let size = |one: &&TunedFeature| {
-        one.feature.compared.as_ref().filter(|_| !reads_mode)?;
+    let index = Index::new(outline);
+    let nodes = Nodes::new(&index, Some(mode));
+    let one = |one: &&TunedFeature| {
+        let compared = one.feature.compared.as_deref().filter(|_| !reads_mode)?;
+        let setpoint = setpoint(&nodes, compared, &one.feature.name)?;
         let size = match one.feature.quantity()? {
             "x" | "y" => PLACE,
             "orientation" | "angle" => ANGLE,
-            _ => SHARE * one.feature.setpoint?.abs(),
+            _ => SHARE * setpoint.abs(),
         };
-        (size > 0.0).then_some(size)
+        (size > 0.0).then_some(Planned { setpoint, size })
     };
-    features.iter().map(size).collect()
+    features.iter().map(one).collect()
 }
 
 /// Returns the name of the mode in which a feature has another setpoint.
@@ -95,18 +116,24 @@ pub(super) fn mode_name(i: usize) -> String {
     format!("{MODE}_{i}")
 }
 
+/// Returns the modes of a trial in their order: the mode itself, one for each step, and the lift.
+pub(super) fn modes(mode: &OutlinedMode, steps: &[Option<Planned>]) -> Vec<String> {
+    let steps = (0..steps.len()).filter(|i| steps[*i].is_some()).map(mode_name);
+    [mode.name.clone()].into_iter().chain(steps).chain([lift::MODE.to_owned()]).collect()
+}
+
 /// Returns the settings that let a mode go on through a step of each feature to the lift.
-pub(super) fn settings(mode: &OutlinedMode, features: &[&TunedFeature], sizes: &[Option<f64>]) -> Vec<String> {
-    let steps: Vec<usize> = (0..sizes.len()).filter(|i| sizes[*i].is_some()).collect();
-    let next = |at: usize| steps.get(at).map_or_else(|| lift::MODE.to_owned(), |i| mode_name(*i));
-    let mut set = vec![lift::go(mode, &next(0), BEFORE_S)];
-    for (at, i) in steps.iter().enumerate() {
-        let (name, feature) = (mode_name(*i), &features[*i].feature);
+pub(super) fn settings(mode: &OutlinedMode, features: &[&TunedFeature], steps: &[Option<Planned>]) -> Vec<String> {
+    let order = modes(mode, steps);
+    let mut set = vec![lift::go(mode, &order[1], BEFORE_S)];
+    let planned = features.iter().zip(steps).filter_map(|(one, step)| Some((&one.feature, (*step)?)));
+    for ((feature, step), names) in planned.zip(order[1..].windows(2)) {
+        let [name, next] = [&names[0], &names[1]];
         let kept = mode.settings.iter().filter(|setting| setting.path != "go" && setting.path != "done");
         set.extend(kept.map(|setting| format!("modes.{name}.{}={}", setting.path, toml(setting))));
-        set.push(format!("modes.{name}.go=[{}]", lift::after(&next(at + 1), LASTS_S)));
-        let (Some(node), Some(size)) = (&feature.compared, sizes[*i]) else { continue };
-        let setpoint = feature.setpoint.unwrap_or_default() + size;
+        set.push(format!("modes.{name}.go=[{}]", lift::after(next, LASTS_S)));
+        let node = feature.compared.as_deref().unwrap_or_default();
+        let setpoint = step.setpoint + step.size;
         set.push(format!("modes.{name}.set.{node}.setpoint.{}={setpoint:?}", feature.name));
     }
     set
@@ -128,21 +155,36 @@ mod tests {
         (0..2000).map(step).collect()
     }
 
+    const HELD: [f64; 500] = [0.01; 500];
+
     #[test]
     fn a_step_has_the_overshoot_of_its_damping() {
         for damping in [0.3_f64, 0.5, 0.9] {
-            let step = Step::of(2.0, &errors(damping), 0.004).unwrap();
+            let errors: Vec<f64> = errors(damping).iter().map(|error| error + 0.01).collect();
+            let step = Step::of(2.0, &HELD, &errors, 0.004).unwrap();
             let overshoot = (-std::f64::consts::PI * damping / (1.0 - damping * damping).sqrt()).exp();
             assert!((step.overshoot - overshoot).abs() < 0.02, "{damping}: {step:?}, {overshoot}");
-            assert!(step.rest < 0.01 && step.failure().is_none() && step.rise_s.unwrap() < 0.8, "{step:?}");
+            assert!(step.rest < 0.01 && step.rise_s.unwrap() < 0.8, "{step:?}");
+            assert_eq!(step.failure(&Step { overshoot: 0.0, rest: 0.0, ..step }), None, "{step:?}");
         }
     }
 
     #[test]
-    fn a_swing_and_a_step_that_is_not_followed_are_failures() {
-        let failure = |errors: &[f64]| Step::of(2.0, errors, 0.004).unwrap().failure().unwrap();
-        assert!(failure(&errors(0.0)).contains("overshoots by"), "{}", failure(&errors(0.0)));
-        assert!(failure(&[2.0; 2000]).contains("the error is 100 %"));
-        assert_eq!(Step::of(2.0, &[f64::NAN; 2000], 0.004), None, "an absent feature says nothing");
+    fn a_swing_and_a_step_that_is_not_followed_are_failures_unless_the_old_gains_have_them_too() {
+        let good = Step::of(2.0, &HELD, &errors(0.7), 0.004).unwrap();
+        for (errors, why) in [(errors(0.0), "overshoots by"), (vec![2.0; 2000], "the error is 100 %")] {
+            let step = Step::of(2.0, &HELD, &errors, 0.004).unwrap();
+            let failure = step.failure(&good).unwrap();
+            assert!(failure.contains(why), "{failure}");
+            assert_eq!(step.failure(&step), None);
+        }
+    }
+
+    #[test]
+    fn what_is_absent_or_not_held_says_nothing() {
+        let gap: Vec<f64> =
+            errors(0.7).into_iter().enumerate().map(|(i, e)| if i == 900 { f64::NAN } else { e }).collect();
+        assert_eq!(Step::of(2.0, &HELD, &gap, 0.004), None);
+        assert_eq!(Step::of(2.0, &[0.5; 500], &errors(0.7), 0.004), None, "a fourth of the step was missing before");
     }
 }

@@ -7,9 +7,9 @@ use tactflow_runtime::graph::{Outline, OutlinedMode, Request, compile};
 use tactflow_runtime::node::ScalarId;
 use tactflow_runtime::record::PortColumns;
 
-use super::stay::Stay;
-use super::step::{self, Step};
-use super::{Stop, TunedFeature, experiment, lift};
+use super::course::Course;
+use super::step::{self, Planned, Step};
+use super::{Stop, TunedFeature, experiment};
 
 /// How a task holds a feature.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -30,6 +30,22 @@ pub(super) struct Held {
     /// Root mean square of the error before the step.
     pub(super) error: Option<f64>,
     pub(super) step: Option<Step>,
+}
+
+/// Largest error, as a multiple of that with the old gains, where no step says more [1].
+const WORSE: f64 = 1.5;
+
+impl Held {
+    /// Returns what is wrong with it, if it is worse than with the old gains.
+    fn failure(&self, old: &Self) -> Option<String> {
+        if let Some((new, old)) = self.step.zip(old.step) {
+            return new.failure(&old);
+        }
+        let growth = self.error.zip(old.error).map(|(new, old)| new / old).filter(|growth| *growth > WORSE);
+        let grows = growth.map(|growth| format!("the error grows to {growth:.1} times what it was"));
+        let is_lost = old.step.is_some() || old.error.is_some() && self.error.is_none();
+        grows.or_else(|| is_lost.then(|| "it is not held, or absent for a while".to_owned()))
+    }
 }
 
 impl Settled {
@@ -56,20 +72,25 @@ impl Trial<'_> {
         }
         let gains = |one: &&TunedFeature| experiment::gains(&one.feature, self.mode, one.new.unwrap_or(one.old));
         let new: Vec<String> = changed.iter().flat_map(gains).collect();
-        let [(old, _), (new, failure)] = [self.hold(&changed, &[])?, self.hold(&changed, &new)?];
+        let steps = step::plan(self.outline, self.mode, &changed);
+        let [(old, _), (new, failure)] = [self.hold(&changed, &steps, &[])?, self.hold(&changed, &steps, &new)?];
         let each = changed.iter().zip(old.into_iter().zip(new));
         Ok(each
             .map(|(one, (old, new))| {
-                let failure = failure.clone().or_else(|| new.step?.failure());
+                let failure = failure.clone().or_else(|| new.failure(&old));
                 Settled { object: object.to_owned(), feature: one.name.clone(), old, new, failure }
             })
             .collect())
     }
 
     /// Returns how the task holds each feature with some gains, and why the run has failed.
-    fn hold(&self, features: &[&TunedFeature], gains: &[String]) -> Result<(Vec<Held>, Option<String>), Stop> {
-        let sizes = step::sizes(self.outline, self.mode, features);
-        let set = [&self.request.set[..], gains, &step::settings(self.mode, features, &sizes)].concat();
+    fn hold(
+        &self,
+        features: &[&TunedFeature],
+        steps: &[Option<Planned>],
+        gains: &[String],
+    ) -> Result<(Vec<Held>, Option<String>), Stop> {
+        let set = [&self.request.set[..], gains, &step::settings(self.mode, features, steps)].concat();
         let request = Request { set, ..self.request.clone() };
         let compiled = compile(self.catalogue, &request).map_err(|report| report.render(false))?;
         let period = compiled.outline().period_s;
@@ -81,35 +102,24 @@ impl Trial<'_> {
         });
         let ports: Vec<ScalarId> = ports.collect::<Result<_, _>>()?;
         let settling = experiment::settling(period);
-        let wanted = (step::BEFORE_S / period) as usize;
-        let mut before = Stay::new(&self.mode.name, settling, wanted);
-        let names: Vec<String> = (0..features.len()).map(step::mode_name).collect();
-        let mut after: Vec<Vec<f64>> = vec![Vec::new(); features.len()];
-        let mut last = String::new();
+        let mut course = Course::new(step::modes(self.mode, steps), settling);
         let options = RunOptions { duration: Some(experiment::duration(period)), ..RunOptions::default() };
         let outcome = run(&mut engine, &options, &mut |engine| {
             let read = |port: &ScalarId| engine.bus().scalar(*port).unwrap_or(f64::NAN);
-            before.see(engine.mode(), || ports.iter().map(read).collect::<Vec<_>>());
-            let now = engine.mode().unwrap_or("the end");
-            if let Some(i) = names.iter().position(|name| name == now) {
-                after[i].push(read(&ports[i]));
-            }
-            if now != last {
-                now.clone_into(&mut last);
-            }
+            course.see(engine.mode(), || ports.iter().map(read).collect());
         });
         let outcome = outcome.map_err(|error| format!("the run cannot start: {error}"))?;
-        let (rows, left) = before.end();
-        let failure = match (&outcome.end, left) {
+        let failure = match (&outcome.end, course.failure()) {
             (End::Interrupted, _) => return Err(Stop::Interrupted),
             (End::Fault(fault), _) => Some(fault.to_string()),
-            (_, Some(mode)) => Some(format!("the task goes on to `{mode}`")),
-            _ if last != lift::MODE => Some(format!("after a step of a setpoint, the task goes on to `{last}`")),
-            _ => None,
+            (_, failure) => failure,
         };
-        let held = (0..features.len()).map(|i| Held {
-            error: deviation(rows.iter().skip(settling).map(|row| row[i])),
-            step: sizes[i].and_then(|size| Step::of(size, &after[i], period)),
+        let held = (0..features.len()).map(|i| {
+            let column = |rows: &[Vec<f64>]| rows.iter().map(|row| row[i]).collect::<Vec<f64>>();
+            let before = column(course.rows(&self.mode.name).get(settling..).unwrap_or_default());
+            let after = column(course.rows(&step::mode_name(i)));
+            let step = steps[i].and_then(|step| Step::of(step.size, &before, &after, period));
+            Held { error: deviation(before.into_iter()), step }
         });
         Ok((held.collect(), failure))
     }

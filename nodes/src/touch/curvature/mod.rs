@@ -1,8 +1,9 @@
 //! `curvature`: how a line bends, where it is, and the turning rate that follows it.
 //!
 //! A least-squares polynomial n = a + b s + c s² (+ d s³) over the tactels, with s along the long axis and n across it,
-//! both from the centre of gravity. w is the weight of the tactel, times the kernel if there is a reach. The normal equations Σ_j S_(i+j) p_j = Σ w n s^i, with S_k = Σ w s^k, are solved
-//! by a Cholesky factorization, for s in lengths of the line. The curvature is κ = n'' / (1 + n'²)^(3/2).
+//! both from the centre of gravity. w is the weight of the tactel, times the kernel if there is a reach. The normal
+//! equations Σ_j S_(i+j) p_j = Σ w n s^i, with S_k = Σ w s^k, are solved by a Cholesky factorization, for s in lengths of
+//! the line. The curvature is κ = n'' / (1 + n'²)^(3/2).
 //!
 //! The centre of gravity of a bend is beside the line, by κ L²/24 for a length L. The curve is not.
 
@@ -37,8 +38,8 @@ use curve::{Axes, Curve, curve};
 /// The end of a region is seldom square to the line: an `image_window` cuts it along rows or columns, and the pad along
 /// its edges. A cubic takes an oblique end for a bend that changes. For straight lines that cross eight rows at up to
 /// 6°, its direction is off by 0.8° (rms). With `reach_m`, the weight of a tactel at the distance s along the line falls
-/// as (1 - (s / reach)²)², the biweight kernel of local regression (Cleveland 1979), so that no end counts: it is off by
-/// 0.35°. Let the region be a little longer than twice the reach.
+/// as (1 - (s / reach)²)², the biweight kernel of local regression (Cleveland 1979): with 22.5 mm in ten rows it is
+/// off by 0.35°. Let the region be a little longer than twice the reach, so that no end counts.
 ///
 /// `turn` is κ L for a length L: the angle between the two ends of an arc. A line whose bend changes, which `degree = 3`
 /// follows, can turn by another angle from end to end. `length` L is that of a uniform bar with the same standard

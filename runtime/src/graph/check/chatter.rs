@@ -1,4 +1,4 @@
-//! Warns of modes that lead to each other again and again, because the same value ends each of them.
+//! Warns of modes that lead to each other again and again: one value, noise at a bound, or short times end each of them.
 
 use std::collections::BTreeSet;
 
@@ -212,7 +212,7 @@ fn help(ring: &[Step<'_>], cause: Cause, period: i64) -> String {
                 "leave a gap, so that noise does not switch back: for example {bound}. `hysteresis` leaves none: it \
                  counts within one mode"
             ),
-            None => "leave a gap between the two bounds, so that no value is beyond both".into(),
+            None => "leave a gap between the two bounds that is wider than the noise".into(),
         },
         _ => "leave a gap between two of the bounds, so that no value is within all of them".into(),
     }

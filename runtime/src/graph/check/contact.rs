@@ -31,13 +31,13 @@ impl ContactPorts {
 
     /// Returns whether a port is present, or set, only while something touches a sensor.
     ///
-    /// Such a port descends from sensors alone, and the contact was segmented upstream of it. A flag must also be of a
-    /// known quantity: other flags may be set without a contact.
+    /// Such a port descends from sensors alone, and the contact was segmented upstream of it. A flag or a number must also
+    /// be of a known quantity: others may be set without a contact, such as the number of regions.
     pub(super) fn need(&self, net: &Net<'_>, port: PortRef) -> bool {
         let declared = net.port(port);
         let is_flag = declared.kind == Kind::Flag;
         match port.producer {
-            _ if is_flag && declared.quantity.is_none() => false,
+            _ if (is_flag || declared.kind == Kind::Scalar) && declared.quantity.is_none() => false,
             Producer::Role(role) => is_sensor(net, role) && is_flag,
             Producer::Task(_) => false,
             Producer::Node(node) => self.is_sensed[node] && (is_flag || self.is_segmented[node]),
