@@ -126,6 +126,7 @@ fn what_cannot_be_tuned_says_why() {
             "the mode `servo` does not control `z`; it controls `x`, `y`, `pressure`",
         ),
         (&["graphs/finger_press.toml"], "a graph without modes has no mode to tune"),
+        (&["graphs/seek_ridge.toml"], "`x` is not measured: its modes can follow each other without a contact"),
     ] {
         let said = say(&[&["tune"], args].concat());
         assert_eq!(said.code, 2, "{}", said.err);

@@ -7,6 +7,7 @@ use tactflow_runtime::catalogue::Catalogue;
 use tactflow_runtime::engine::{End, Engine, RunOptions, run};
 use tactflow_runtime::graph::{Outline, OutlinedMode, Request, compile};
 use tactflow_runtime::record::PortColumns;
+use tactflow_runtime::source::{Code, Report};
 
 use super::lift;
 use super::stay::Stay;
@@ -185,7 +186,7 @@ impl Experiment<'_> {
     /// If the graph with the signal does not load.
     pub(super) fn run(&self, way: f64) -> Result<Answered, String> {
         let request = Request { set: [&self.request.set[..], &self.settings(way)].concat(), ..self.request.clone() };
-        let compiled = compile(self.catalogue, &request).map_err(|report| report.render(false))?;
+        let compiled = compile(self.catalogue, &request).map_err(|report| self.refused(&report))?;
         let mut engine = Engine::new(compiled);
         let pid = self.feature.pid.as_deref().unwrap_or_default();
         let find = |engine: &Engine, name: String| {
@@ -217,6 +218,18 @@ impl Experiment<'_> {
             }
             _ => Answered::Lines(sines.iter().map(|sine| self.line(rows, sine)).collect()),
         })
+    }
+
+    /// Returns why the graph with the signal does not load.
+    fn refused(&self, report: &Report) -> String {
+        if !report.diagnostics.iter().any(|one| one.code == Code::UngatedMotion) {
+            return report.render(false);
+        }
+        format!(
+            "`{}` is not measured: its modes can follow each other without a contact, so nothing would end the test \
+             signal. Tune it in a task that holds it in one mode",
+            self.feature.name
+        )
     }
 
     /// Returns the response to a sine, with half of the gains: the controller is linear.
