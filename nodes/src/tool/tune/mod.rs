@@ -229,12 +229,12 @@ fn tune(args: &TuneArgs, shell: &Shell, request: &Request, outline: &Outline) ->
             Ok(propose(feature.clone(), found, &contacts, wanted, outline.period_s))
         };
         let first = measure(HALF)?;
-        // A loop with very different gains says little about the frequencies that count.
-        features.push(match first.factor().filter(|factor| !(1.0 / FAR..=FAR).contains(factor)) {
+        // A stiff loop holds the contact against the test signal, and friction then hides more of the motion.
+        features.push(match first.factor().filter(|factor| *factor < HIGH) {
             Some(factor) => {
-                let (name, times) = (&feature.name, page::rounded(factor));
-                shell.say_beside(&format!("`{name}`: again, with half of {times} times the gains"));
-                let again = measure(HALF * factor)?;
+                let name = &feature.name;
+                shell.say_beside(&format!("`{name}`: again, with a quarter of the gains that were found"));
+                let again = measure(QUARTER * factor)?;
                 if again.new.is_some() { again } else { first }
             }
             None => first,
@@ -301,8 +301,10 @@ fn quantity(feature: &Feature) -> String {
     feature.quantity().unwrap_or(&feature.name).to_owned()
 }
 
-/// Ratio of the proposed gains to those of the graph from which on a loop is measured again, with the proposed ones [1].
-const FAR: f64 = 2.0;
+/// Proposed gains, as a multiple of those of the graph, below which a loop is measured again [1].
+const HIGH: f64 = 0.83;
+/// Share of the proposed gains with which it is measured again [1].
+const QUARTER: f64 = 0.25;
 
 impl TunedFeature {
     /// Returns the proposed gains as a multiple of those of the graph.
