@@ -69,7 +69,7 @@ fn follow<'a>(nodes: &Nodes<'a>, port: &str, path: &mut Vec<&'a str>) -> Option<
     found
 }
 
-/// Returns the slower one of two sides, with the gates of both.
+/// Returns the slower one of two sides, with the gates that stand on each side.
 fn slower(sides: Vec<Way>) -> Option<Way> {
     let is_everywhere = |gate: &String| sides.iter().all(|side| side.gates.contains(gate));
     let slowest = sides.iter().max_by(|one, other| one.delay().total_cmp(&other.delay()))?;

@@ -114,8 +114,7 @@ impl Feature {
 
     /// Returns the delay of the filters that smooth it [s].
     pub(crate) fn smoothing(&self) -> f64 {
-        let smooth = self.filters.iter().filter(|filter| !matches!(filter.shape, Shape::Delay { .. }));
-        smooth.map(|filter| filter.delay_s).sum()
+        self.filters.iter().filter(|filter| filter.shape.smooths()).map(|filter| filter.delay_s).sum()
     }
 
     /// Returns the delay of all filters [s].

@@ -28,6 +28,11 @@ pub(crate) enum Shape {
 }
 
 impl Shape {
+    /// Returns whether it smooths what it passes.
+    pub(crate) const fn smooths(self) -> bool {
+        !matches!(self, Self::Delay { .. })
+    }
+
     /// Returns the delay that the filter gives to a slow ramp, for samples at `period` [s]: the time constant of a
     /// low-pass, and half of a window.
     pub(crate) fn delay(self, period: f64) -> f64 {

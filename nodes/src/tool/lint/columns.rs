@@ -81,7 +81,7 @@ fn blocked(mode: &ModeLaw<'_>, feature: &Feature, row: &Row) -> Diagnostic {
         moved(&feature.column)
     );
     let help = format!(
-        "select {} in the projector, or write 0 for `{name}` in the gains of this mode",
+        "select {} in the projector, or let the column of `{name}` move no other component",
         row.components(" or ")
     );
     Diagnostic::new(Code::UnusedColumn, mode.place_of_column(feature), message).help(help)

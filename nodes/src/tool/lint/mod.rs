@@ -6,6 +6,7 @@
 //! states.
 
 mod columns;
+mod exits;
 mod gains;
 mod modes;
 mod presence;

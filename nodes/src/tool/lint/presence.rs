@@ -36,7 +36,7 @@ fn barred<'f>(mode: &ModeLaw<'_>, feature: &'f Feature) -> Option<(&'f str, Stri
 /// Returns whether a flag is the opposite of a contact.
 fn is_without_contact(mode: &ModeLaw<'_>, flag: &str) -> bool {
     let not = mode.nodes.writer(flag).filter(|node| node.kind.text == "not");
-    not.and_then(|not| source(not, "value").or_else(|| not.wires.first().map(|wire| &*wire.source)))
+    not.and_then(|not| source(not, "flag"))
         .and_then(|port| Some((port, mode.nodes.writer(port)?)))
         .is_some_and(|(port, node)| port.ends_with(".present") && node.kind.text == "label")
 }

@@ -2,32 +2,12 @@
 
 use std::collections::BTreeSet;
 
-use tactflow_runtime::source::{Code, Diagnostic, Diagnostics, Item, Value};
+use tactflow_runtime::source::{Code, Diagnostic, Diagnostics};
 
+use super::exits::Exit;
 use super::{Controlled, ModeLaw};
 
-/// An exit of a mode that leads to another one.
-pub(super) struct Exit<'a> {
-    to: &'a str,
-    value: &'a Value,
-}
-
 impl ModeLaw<'_> {
-    /// Returns the exits of a kind that lead to other modes.
-    pub(super) fn exits(&self, kind: &'static str) -> impl Iterator<Item = Exit<'_>> {
-        let settings = self.mode.iter().flat_map(|mode| &mode.settings).filter(move |setting| setting.path == kind);
-        let each = settings.flat_map(|setting| match &setting.value.item {
-            Item::Array(exits) => exits.iter().collect(),
-            _ => vec![&setting.value],
-        });
-        each.filter_map(|value| Some(Exit { to: value.as_table()?.get("to")?.as_str()?, value }))
-    }
-
-    /// Returns the exits that are taken when the contact is lost.
-    fn lost(&self) -> impl Iterator<Item = Exit<'_>> {
-        self.exits("on_lost").chain(self.exits("go").filter(Exit::is_lost))
-    }
-
     fn own_name(&self) -> &str {
         self.mode.map_or("", |mode| mode.name.rsplit('.').next().unwrap_or_default())
     }
@@ -35,14 +15,6 @@ impl ModeLaw<'_> {
     /// Returns the speed along +z with which the mode moves the sensor whatever it feels [m/s].
     fn approach(&self) -> f64 {
         self.law.constants.iter().map(|constant| constant.twist[2]).sum()
-    }
-}
-
-impl Exit<'_> {
-    /// Returns whether a `go` waits until there is no contact.
-    fn is_lost(&self) -> bool {
-        let word = |key: &str| self.value.as_table()?.get(key)?.as_str();
-        word("when").is_some_and(|port| port.ends_with(".present")) && matches!(word("is"), Some("false" | "absent"))
     }
 }
 

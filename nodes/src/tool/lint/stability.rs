@@ -85,8 +85,9 @@ fn judge(mode: &ModeLaw<'_>, feature: &Feature, contacts: &[Contact]) -> Option<
     let low = worst(&|found| !KEPT.holds(&found.margins));
     let slow = worst(&|found| is_slow(&found.margins, found.lag)).filter(|_| low.is_none() || feature.delay() > SLOW);
     match (slow, low) {
-        (Some(slow), low) => slow_filter(mode, feature, contacts, slow)
-            .or_else(|| Some(low_margin(mode, feature, &loops, low.unwrap_or(slow)))),
+        (Some(slow), low) => {
+            slow_filter(mode, feature, contacts, slow).or_else(|| low.map(|low| low_margin(mode, feature, &loops, low)))
+        }
         (_, Some(low)) => Some(low_margin(mode, feature, &loops, low)),
         _ => None,
     }
@@ -175,7 +176,7 @@ fn rounded(number: f64, round: impl Fn(f64) -> f64) -> f64 {
 
 fn slow_filter(mode: &ModeLaw<'_>, feature: &Feature, contacts: &[Contact], slow: &Found<'_>) -> Option<Diagnostic> {
     let filters = feature.filters.iter().enumerate();
-    let filters = filters.filter(|(_, filter)| !matches!(filter.shape, Shape::Delay { .. }));
+    let filters = filters.filter(|(_, filter)| filter.shape.smooths());
     let (i, slowest) = filters.max_by(|(_, one), (_, other)| one.delay_s.total_cmp(&other.delay_s))?;
     let node = mode.nodes.node(&slowest.node)?;
     let keys = ["time_constant_ms", "cutoff_hz", "window_ms", "window"];

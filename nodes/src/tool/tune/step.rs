@@ -8,7 +8,7 @@ use crate::tool::control::law::setpoint;
 use crate::tool::control::settings::{Index, Nodes, mode_flag, toml};
 
 /// How long a task holds its setpoints before the first step [s].
-pub(super) const BEFORE_S: f64 = 12.0;
+const BEFORE_S: f64 = 12.0;
 /// How long a setpoint stays changed [s].
 const LASTS_S: f64 = 8.0;
 /// Beginning of the names of the modes with a changed setpoint.

@@ -25,7 +25,7 @@ pub(super) struct Settled {
 }
 
 /// How a feature is held with some gains.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub(super) struct Held {
     /// Root mean square of the error before the step.
     pub(super) error: Option<f64>,
