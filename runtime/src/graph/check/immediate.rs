@@ -51,7 +51,8 @@ impl<'a> Ways<'a> {
     }
 }
 
-/// Returns whether an exit waits for no longer than the way into its mode did, or for one period [ns].
+/// Returns whether an exit waits for less than [`SHORT`], and for no longer than the way into its mode did or than one
+/// period [ns].
 ///
 /// `for_ms` counts from the start of the mode, whatever was before. A mode lasts at least as long as its exit waits.
 const fn is_short(way: &PlannedExit, exit: &PlannedExit, period: i64) -> bool {
