@@ -318,7 +318,7 @@ fn the_python_package_states_runs_and_reads() {
         return;
     }
     let (folder, recording) = in_new_folder("run.mcap");
-    let recorded = ["run", HYBRID, "--for", "1s", "--record", &recording];
+    let recorded = ["run", HYBRID, "--for", "2s", "--record", &recording];
     let recorded = said(tool(&recorded).env("PYTHONPATH", &package));
     assert_eq!(recorded.code, 0, "{}", recorded.err);
     let mut read = Command::new("python3");
