@@ -57,9 +57,12 @@ pub fn from_smaller_unit(number: f64, unit: Unit) -> Option<(f64, &'static str)>
 pub fn unusual(param: &str, number: f64, [min, max]: [f64; 2], unit: Unit) -> Option<Mistake> {
     let is_usual = |number: f64| (min..=max).contains(&number);
     let rounded = |end: f64| (end * 1e4).round() / 1e4;
-    let message = format!("`{param}` is {number} {unit}, but usual is {} to {} {unit}", rounded(min), rounded(max));
+    let name = if unit == Unit::default() { String::new() } else { format!(" {unit}") };
+    let message = format!("`{param}` is {number}{name}, but usual is {} to {}{name}", rounded(min), rounded(max));
     let within = format!("write a number from {} to {}", rounded(min), rounded(max));
-    let help = match from_smaller_unit(number, unit).filter(|(number, _)| is_usual(*number)) {
+    // Nobody writes a fraction of a smaller unit.
+    let smaller = from_smaller_unit(number, unit).filter(|(converted, _)| number.abs() >= 1.0 && is_usual(*converted));
+    let help = match smaller {
         Some((converted, other)) => format!("if {number} is in {other}, write `{converted}`; or else {within}"),
         None => within,
     };

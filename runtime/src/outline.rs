@@ -129,6 +129,9 @@ pub struct OutlinedPort {
     pub unit: Option<String>,
     /// Its frames, where they are known.
     pub frames: Vec<Option<String>>,
+    /// The smallest and the largest value of a number, if both are finite.
+    #[serde(skip)]
+    pub range: Option<[f64; 2]>,
 }
 
 /// A value of a section or a block.

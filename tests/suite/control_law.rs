@@ -36,7 +36,7 @@ pub(crate) fn explained(args: &[&str]) -> Value {
 
 /// The factor of a schedule on the control of a feature in a tick.
 fn factor(schedule: &Value, row: &BTreeMap<String, f64>) -> f64 {
-    let Some(ratio) = row.get("stiffness.ratio").filter(|_| schedule.is_object()) else { return 1.0 };
+    let Some(ratio) = row.get("stiffness.ratio") else { return 1.0 };
     let bound = |key: &str| schedule[key].as_f64().unwrap();
     (1.0 / ratio).clamp(bound("min"), bound("max"))
 }
@@ -60,7 +60,8 @@ fn assert_is_the_law_of_a_run(graph: &str, sum: &str, for_s: &str) {
                 let by_hand = feature["kp"].as_f64().unwrap() * error;
                 assert!((control - by_hand).abs() < 1e-9, "{graph}, {name}: {control} and {by_hand}");
             }
-            let factor = factor(&feature["schedule"], row);
+            let schedules = feature["schedules"].as_array().into_iter().flatten();
+            let factor: f64 = schedules.map(|schedule| factor(schedule, row)).product();
             (0..6).for_each(|i| twist[i] += feature["column"][i].as_f64().unwrap() * control * factor);
         }
         for constant in mode["constants"].as_array().unwrap() {

@@ -3,7 +3,7 @@
 use tactflow_runtime::harness::GraphRig;
 use tactflow_runtime::node::{
     AnyNode, Built, Bus, Configured, Declared, Given, Mistake, Mistakes, Motion, NodeSpec, NodeType, Param, PortId,
-    PortSpec, Reader, Tick, Wires,
+    PortSpec, Reader, Reading, Tick, Wires,
 };
 use tactflow_runtime::signal::{Freshness, Kind, Scalar, Shape};
 use tactflow_runtime::source::Value;
@@ -51,7 +51,7 @@ impl Configured for Polynomial {
         }
         let outputs: Vec<Shape> = vec![given.inputs[0][0].1.clone()];
         let (motion, warnings) = (Motion::Any, Mistakes::new());
-        Ok(Built { node: self, outputs, motion, is_uncalibrated: false, warnings })
+        Ok(Built { node: self, outputs, motion, reading: Reading::Other, is_uncalibrated: false, warnings })
     }
 }
 

@@ -9,7 +9,7 @@ use tactflow_runtime::device::{
 use tactflow_runtime::harness::lint;
 use tactflow_runtime::node::{
     AnyNode, Bounds, Built, Bus, Configured, Declared, Given, Limits, Mistakes, Motion, NodeSpec, NodeType, ParamSpec,
-    PortId, PortSpec, Reader, Tick, Wires,
+    PortId, PortSpec, Reader, Reading, Tick, Wires,
 };
 use tactflow_runtime::signal::{Kind, Scalar, ScalarShape, Signal, Unit};
 use tactflow_runtime::source::Value;
@@ -98,7 +98,7 @@ impl Configured for Counter {
     fn build(self: Box<Self>, _: Given) -> Result<Built, Mistakes> {
         let outputs = vec![ScalarShape::of(Unit::METRE).within(0.0, 1000.0).into()];
         let (motion, warnings) = (Motion::Any, Mistakes::new());
-        Ok(Built { node: self, outputs, motion, is_uncalibrated: false, warnings })
+        Ok(Built { node: self, outputs, motion, reading: Reading::Other, is_uncalibrated: false, warnings })
     }
 }
 

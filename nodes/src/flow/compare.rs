@@ -1,7 +1,7 @@
 //! `compare`: a flag from a scalar and its bounds.
 
 use tactflow_runtime::node::{
-    At, Describe, In, Inputs, Mistake, Mistakes, Node, Out, Outputs, Param, Setup, State, Tick,
+    At, Describe, In, Inputs, Mistake, Mistakes, Node, Out, Outputs, Param, Reading, Setup, State, Tick,
 };
 use tactflow_runtime::signal::{Flag, Scalar};
 use tactflow_runtime::source::Code;
@@ -74,7 +74,7 @@ impl Node for Compare {
     type Outputs = Outputs;
     type State = State;
 
-    fn new(Params { above, below, hysteresis }: Params, _: &mut Setup<Self>) -> Result<Self, Mistakes> {
+    fn new(Params { above, below, hysteresis }: Params, setup: &mut Setup<Self>) -> Result<Self, Mistakes> {
         if above.is_none() && below.is_none() {
             let mistake = Mistake::new(Code::MissingKey, At::Node, "`compare` has no bound");
             return Err(mistake.help("write `above`, `below` or both").into());
@@ -84,6 +84,7 @@ impl Node for Compare {
             let message = format!("no value is above {above} and below {below}");
             return Err(Mistake::param("below", message).help("make `below` greater than `above`").into());
         }
+        setup.reading = Reading::Between { min: above, max: below, hysteresis };
         Ok(Self { above, below, hysteresis })
     }
 

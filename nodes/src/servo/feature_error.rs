@@ -132,7 +132,8 @@ fn usual(shape: &ScalarShape) -> [f64; 2] {
         _ if shape.unit.is_axial() => [-USUAL_RAD, USUAL_RAD],
         range if range.iter().all(|end| end.is_finite()) => range,
         _ if shape.unit == Unit::NEWTON.per_tactel() => [0.0, USUAL_PRESSURE_N],
-        _ if shape.unit == Unit::NEWTON => [0.0, USUAL_FORCE_N],
+        // The components of a force have a sign, and a node that measures a normal force says that it has none.
+        [min, _] if shape.unit == Unit::NEWTON => [min.max(-USUAL_FORCE_N), USUAL_FORCE_N],
         range => range,
     }
 }

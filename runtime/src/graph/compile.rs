@@ -181,7 +181,7 @@ fn check_modes(
     period: f64,
     diagnostics: &mut Diagnostics,
 ) -> (Vec<PlannedMode>, Vec<usize>) {
-    let BuiltModes { modes, motions, demand, demand_changes, freezes } = built;
+    let BuiltModes { modes, motions, readings, demand, demand_changes, freezes } = built;
     let reads = |mode: usize, node: usize, port: usize| demand.of(node, &demand_changes[mode])[port];
     let contact = ContactPorts::new(net);
     let generators = Generators::new(net, &contact, &motions);
@@ -190,7 +190,7 @@ fn check_modes(
     check::motion::check(net, &contact, &modes, &generators, diagnostics);
     check::late::check(&modes, period, diagnostics);
     check::immediate::check(net, &modes, period, diagnostics);
-    check::chatter::check(net, &contact, &modes, period, diagnostics);
+    check::chatter::check((net, &readings), &contact, &modes, period, diagnostics);
     let starts = check::reachability::check(net, diagnostics);
     check::approach::check(net, &contact, &modes, &starts, (&motions, &generators), diagnostics);
     (modes, starts)

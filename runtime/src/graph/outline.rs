@@ -14,6 +14,7 @@ use crate::outline::{
     NO_SPAN, Outline, OutlinedBlock, OutlinedMode, OutlinedPort, OutlinedRole, OutlinedTask, OutlinedWire,
     OutlinedWord, Setting, ValueOrigin,
 };
+use crate::signal::Shape;
 use crate::source::{Diagnostics, Item, Key, SourceMap, Table, Value, parse_table};
 
 /// Builds the outline of a graph without mistakes.
@@ -293,6 +294,10 @@ fn outlined_port(port: &PlannedPort) -> OutlinedPort {
         kind: port.shape.kind().name(),
         unit: port.shape.unit().map(|unit| unit.to_string()),
         frames: port.frames.clone(),
+        range: match &port.shape {
+            Shape::Scalar(shape) => Some(shape.range).filter(|range| range.iter().all(|end| end.is_finite())),
+            _ => None,
+        },
     }
 }
 

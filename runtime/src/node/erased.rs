@@ -9,7 +9,7 @@ use std::marker::PhantomData;
 
 use super::{
     Bus, Components, InputSet, Limits, Mistakes, Motion, Node, OutputSet, Param, ParamSpec, PortId, PortSpec, Reader,
-    Setup, Tick, Wires,
+    Reading, Setup, Tick, Wires,
 };
 use crate::signal::Shape;
 use crate::source::Value;
@@ -78,6 +78,8 @@ pub struct Built {
     pub outputs: Vec<Shape>,
     /// The motion that the node generates; see [`Setup`].
     pub motion: Motion,
+    /// What its first output says about its first input; see [`Setup`].
+    pub reading: Reading,
     /// Whether its limits are in raw readings; see [`Setup`].
     pub is_uncalibrated: bool,
     /// The warnings about its parameters and its wires.
@@ -174,15 +176,16 @@ impl<N: Node> Configured for WithParams<N> {
     fn build(self: Box<Self>, given: Given) -> Result<Built, Mistakes> {
         let inputs = <N::Inputs<'static> as InputSet<'static>>::shapes(given.inputs);
         let (outputs, period, sample_periods) = (Default::default(), given.period, given.sample_periods);
-        let (motion, warnings) = (Motion::Any, Mistakes::new());
+        let (motion, reading, warnings) = (Motion::Any, Reading::Other, Mistakes::new());
+        let is_uncalibrated = false;
         let mut setup =
-            Setup::<N> { inputs, outputs, period, sample_periods, motion, is_uncalibrated: false, warnings };
+            Setup::<N> { inputs, outputs, period, sample_periods, motion, reading, is_uncalibrated, warnings };
         let node = N::new(self.0, &mut setup)?;
-        let Setup { motion, is_uncalibrated, warnings, .. } = setup;
+        let Setup { motion, reading, is_uncalibrated, warnings, .. } = setup;
         let outputs = N::Outputs::into_shapes(setup.outputs);
         let state = node.state();
         let cell = Cell { active: Configuration { fresh: node.state(), node }, state, parked: vec![None], number: 0 };
-        Ok(Built { node: Box::new(cell), outputs, motion, is_uncalibrated, warnings })
+        Ok(Built { node: Box::new(cell), outputs, motion, reading, is_uncalibrated, warnings })
     }
 }
 

@@ -54,6 +54,7 @@ mod params;
 mod pattern;
 mod ports;
 mod reader;
+mod reading;
 mod tick;
 mod time;
 mod usual;
@@ -75,6 +76,7 @@ pub use params::{Map, Spanned};
 pub(crate) use pattern::{UnitPattern, declares_a_unit, frame_args, may_fit, unit_pattern};
 pub use ports::{LetterKind, Letters, Need, PortSpec};
 pub use reader::{Measured, OpenTable, Param, ParamTable, Reader, read_leaf};
+pub use reading::Reading;
 pub use tactflow_derive::{Describe, Inputs, Outputs, Param, State};
 pub use tick::Tick;
 pub use time::{Absence, Interval};
@@ -184,6 +186,8 @@ pub struct Setup<N: Node> {
     pub(crate) sample_periods: Vec<f64>,
     /// The motion that the node generates. A node whose output is computed from samples leaves it `Any`.
     pub motion: Motion,
+    /// What the first output says about the first input, if the node only smooths, delays or compares it.
+    pub reading: Reading,
     /// Set by a limiter whose limits are in raw readings, so that nothing is limited in newtons. The bench must allow
     /// it.
     pub is_uncalibrated: bool,

@@ -146,6 +146,8 @@ codes! {
     UnforcedRolling "unforced-rolling",
     /// A position that is controlled along the line that a mode follows.
     LinePosition "line-position",
+    /// Two motions of a mode that work against each other, or a motion into a pressed object.
+    OpposedMotion "opposed-motion",
     /// A lost contact that is searched for faster than it was approached.
     FastRecovery "fast-recovery",
     /// A setpoint at or above a limit that holds for its feature.
@@ -210,6 +212,7 @@ impl Code {
             | Self::LateExit
             | Self::ImmediateExit
             | Self::ChatteringModes
+            | Self::OpposedMotion
             | Self::UnusedAllow => Severity::Warning,
             _ => Severity::Error,
         }

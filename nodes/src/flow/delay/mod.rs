@@ -5,7 +5,7 @@
 
 mod delayable;
 
-use tactflow_runtime::node::{Describe, In, Inputs, Mistakes, Node, Out, Outputs, Setup, Tick};
+use tactflow_runtime::node::{Describe, In, Inputs, Mistakes, Node, Out, Outputs, Reading, Setup, Tick};
 use tactflow_runtime::signal::{Scalar, Signal, Twist};
 
 use super::passing::State;
@@ -74,6 +74,7 @@ where
     fn new(params: T::Params, setup: &mut Setup<Self>) -> Result<Self, Mistakes> {
         let (shape, initial) = T::configure(params);
         setup.outputs.value = shape;
+        setup.reading = Reading::Same;
         Ok(Self { initial })
     }
 

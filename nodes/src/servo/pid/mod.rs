@@ -91,13 +91,10 @@ impl Gains {
                 format!("write `{gain} = {}`, and check that the column of `{feature}` reduces its error", -value);
             return Some(warn(Code::UnusualGain, gain, message)?.help(help));
         }
-        if self.kp == 0.0 {
-            let what = if self.ki > 0.0 {
-                "the integral alone corrects the error, and swings"
-            } else {
-                "nothing corrects the error"
-            };
-            let message = format!("the gain `kp` of `{feature}` is 0 1/s: {what}");
+        // A feature without any gain rests. Whether another mode gives it one is not known here.
+        if self.kp == 0.0 && self.ki > 0.0 {
+            let message =
+                format!("the gain `kp` of `{feature}` is 0 1/s: the integral alone corrects the error, and swings");
             let help = format!("write a gain greater than 0, or remove the wire of `{feature}` to stop controlling it");
             return Some(warn(Code::UnusualGain, "kp", message)?.help(help));
         }

@@ -79,15 +79,7 @@ mod tests {
             column: [0.0, 0.0, 1.0, 0.0, 0.0, 0.0],
             kp: 1.0,
             ki,
-            kd: 0.0,
-            measured: None,
-            setpoint: None,
-            jacobian: String::new(),
-            pid: None,
-            compared: None,
-            schedule: None,
-            filters: Vec::new(),
-            gates: Vec::new(),
+            ..Feature::default()
         };
         Loop::new(&feature, &Answer { vz: Some(gain), ..Answer::default() }, delay, 1e-4)
     }

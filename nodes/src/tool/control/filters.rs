@@ -20,13 +20,13 @@ pub(crate) struct Filter {
 
 /// The way of a feature from its measurement to its error.
 #[derive(Debug, Default)]
-pub(super) struct Way {
+pub(crate) struct Way {
     /// The port that is measured.
-    pub(super) measured: String,
+    pub(crate) measured: String,
     /// The first one first.
-    pub(super) filters: Vec<Filter>,
+    pub(crate) filters: Vec<Filter>,
     /// The flags without which the feature does not pass.
-    pub(super) gates: Vec<String>,
+    pub(crate) gates: Vec<String>,
 }
 
 impl Way {
@@ -36,7 +36,7 @@ impl Way {
 }
 
 /// Follows a feature back to its measurement.
-pub(super) fn way(nodes: &Nodes<'_>, port: &str) -> Way {
+pub(crate) fn way(nodes: &Nodes<'_>, port: &str) -> Way {
     follow(nodes, port, &mut Vec::new()).unwrap_or_else(|| Way { measured: port.to_owned(), ..Way::default() })
 }
 

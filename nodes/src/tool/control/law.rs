@@ -15,15 +15,12 @@ pub(crate) struct Law {
     pub(crate) features: Vec<Feature>,
     /// Constant motions.
     pub(crate) constants: Vec<Constant>,
-    /// Whether a node makes constant motions, in this mode or in another one.
-    #[serde(skip)]
-    pub(crate) has_constants: bool,
     /// Other nodes that move the arm, which this command does not know in numbers.
     pub(crate) guidance: Vec<Guidance>,
 }
 
 /// A feature that is controlled.
-#[derive(Debug, Clone, Serialize)]
+#[derive(Debug, Clone, Default, Serialize)]
 pub(crate) struct Feature {
     pub(crate) name: String,
     /// Speed of each component for one unit of control, after the projectors.
@@ -49,8 +46,11 @@ pub(crate) struct Feature {
     #[serde(skip)]
     pub(crate) gates: Vec<String>,
     /// What multiplies all three gains, depending on the contact.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub(crate) schedule: Option<Schedule>,
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub(crate) schedules: Vec<Schedule>,
+    /// What else moves the arm by the same measurement: its loop adds to this one.
+    #[serde(skip)]
+    pub(crate) beside: Vec<Self>,
 }
 
 /// A constant twist, after the projectors.
@@ -127,6 +127,13 @@ impl Feature {
 pub(crate) fn law(nodes: &Nodes<'_>, port: &str) -> Law {
     let mut law = Law::default();
     collect(nodes, port, [true; 6], &mut law, &mut Vec::new());
+    let alone = law.features.clone();
+    for (i, feature) in law.features.iter_mut().enumerate() {
+        let others = alone.iter().enumerate().filter(|(other, _)| *other != i).map(|(_, other)| other);
+        let is_beside =
+            |other: &&Feature| other.moves() && other.measured.is_some() && other.measured == feature.measured;
+        feature.beside = others.filter(is_beside).cloned().collect();
+    }
     law
 }
 
@@ -158,7 +165,6 @@ fn collect<'a>(nodes: &Nodes<'a>, port: &str, passes: [bool; 6], law: &mut Law, 
         "twist_source" => {
             let twist: [f64; 6] = nodes.value(node, "twist").and_then(|twist| twist.value.read()).unwrap_or_default();
             let twist = masked(twist);
-            law.has_constants = true;
             if twist.iter().any(|part| *part != 0.0) {
                 law.constants.push(Constant { node: node.name.clone(), twist });
             }
@@ -182,12 +188,13 @@ pub(crate) fn setpoint(nodes: &Nodes<'_>, compared: &str, feature: &str) -> Opti
 }
 
 /// Follows a feature from its column back to its measurement.
-fn feature(nodes: &Nodes<'_>, jacobian: &OutlinedBlock, name: String, column: [f64; 6]) -> Feature {
-    let before = |node: &OutlinedBlock, input: &str, kind: &str| {
+fn feature<'a>(nodes: &Nodes<'a>, jacobian: &'a OutlinedBlock, name: String, column: [f64; 6]) -> Feature {
+    let before = |node: &'a OutlinedBlock, input: &str, kind: &str| {
         source(node, input).and_then(|port| nodes.writer(port)).filter(|writer| writer.kind.text == kind)
     };
-    let scheduled = before(jacobian, "control", "gain_schedule");
-    let pid = before(scheduled.unwrap_or(jacobian), "control", "pid");
+    let next = |node: &&'a OutlinedBlock| before(node, "control", "gain_schedule");
+    let scheduled: Vec<_> = std::iter::successors(next(&jacobian), next).collect();
+    let pid = before(scheduled.last().copied().unwrap_or(jacobian), "control", "pid");
     let gain = |which: &str| pid.and_then(|pid| nodes.number(pid, &format!("gains.{name}.{which}"))).unwrap_or(0.0);
     let behind = pid.map(|pid| before(pid, "error", "deadband").unwrap_or(pid));
     let error = behind.and_then(|node| before(node, "error", "feature_error"));
@@ -198,7 +205,8 @@ fn feature(nodes: &Nodes<'_>, jacobian: &OutlinedBlock, name: String, column: [f
     let [kp, ki, kd] = ["kp", "ki", "kd"].map(gain);
     let compared = error.map(|error| error.name.clone());
     let pid = pid.map(|pid| pid.name.clone());
-    let schedule = scheduled.and_then(|node| Schedule::of(nodes, node, &name, measured.as_deref()));
-    let jacobian = jacobian.name.clone();
-    Feature { column, kp, ki, kd, measured, setpoint, filters, gates, schedule, name, jacobian, pid, compared }
+    let schedules = scheduled.into_iter().filter_map(|node| Schedule::of(nodes, node, &name, measured.as_deref()));
+    let schedules = schedules.collect();
+    let (jacobian, beside) = (jacobian.name.clone(), Vec::new());
+    Feature { column, kp, ki, kd, measured, setpoint, filters, gates, schedules, name, jacobian, pid, compared, beside }
 }

@@ -29,6 +29,8 @@ pub(crate) struct Loop {
     pub(crate) period: f64,
     /// What was measured, as a multiple of the model, at circular frequencies from low to high [rad/s]; empty if nothing was.
     measured: Vec<(f64, Complex<f64>)>,
+    /// Loops of the same measurement, which add to this one.
+    beside: Vec<Self>,
 }
 
 impl Loop {
@@ -37,9 +39,15 @@ impl Loop {
     pub(crate) fn over(feature: &Feature, contact: &Contact, period: f64) -> Option<Self> {
         let answer = contact.answer(feature.quantity()?)?;
         let latency_ms = answer.latency_ms.unwrap_or(contact.latency_ms);
-        let around = Self::new(feature, &answer, latency_ms * 1e-3, period);
-        let factor = feature.schedule.as_ref().map_or(Some(1.0), |schedule| schedule.factor(&answer))?;
-        (around.gain != 0.0).then(|| around.times(factor))
+        let (copies, others): (Vec<&Feature>, Vec<&Feature>) =
+            feature.beside.iter().partition(|other| other.pid == feature.pid && other.name == feature.name);
+        // The same control that moves the arm on several ways.
+        let column = std::array::from_fn(|i| feature.column[i] + copies.iter().map(|copy| copy.column[i]).sum::<f64>());
+        let around = Self::new(&Feature { column, ..feature.clone() }, &answer, latency_ms * 1e-3, period);
+        let factors = feature.schedules.iter().map(|schedule| schedule.factor(&answer));
+        let factor = factors.product::<Option<f64>>()?;
+        let beside: Option<Vec<Self>> = others.into_iter().map(|other| Self::over(other, contact, period)).collect();
+        (around.gain != 0.0).then_some(Self { beside: beside?, ..around.times(factor) })
     }
 
     /// Returns the loop of a feature, with the latency and the period [s].
@@ -47,10 +55,11 @@ impl Loop {
         let gain = answer.row().iter().zip(feature.column).map(|(answer, column)| answer * column).sum();
         let Feature { kp, ki, kd, .. } = *feature;
         let shapes = feature.filters.iter().map(|filter| filter.shape).collect();
-        Self { kp, ki, kd, shapes, gain, resonance: answer.resonance(), latency, period, measured: Vec::new() }
+        let (resonance, measured, beside) = (answer.resonance(), Vec::new(), Vec::new());
+        Self { kp, ki, kd, shapes, gain, resonance, latency, period, measured, beside }
     }
 
-    /// Returns the same loop with all gains of the controller times a factor.
+    /// Returns the same loop with all gains of the controller times a factor. Those of the loops beside it stay.
     pub(crate) fn times(&self, factor: f64) -> Self {
         let [kp, ki, kd] = [self.kp, self.ki, self.kd].map(|gain| gain * factor);
         Self { kp, ki, kd, ..self.clone() }
@@ -59,17 +68,23 @@ impl Loop {
     /// Returns the same loop as it was measured: as a multiple of the model, at circular frequencies from low to high
     /// [rad/s].
     pub(crate) fn measured(&self, measured: Vec<(f64, Complex<f64>)>) -> Self {
-        Self { measured, ..self.clone() }
+        let beside = self.beside.iter().map(|other| other.measured(measured.clone())).collect();
+        Self { measured, beside, ..self.clone() }
     }
 
     /// Returns the number of poles at zero: the motion integrates, and so does `ki`.
     pub(crate) fn integrators(&self) -> usize {
-        if self.ki == 0.0 { 1 } else { 2 }
+        if self.all().all(|one| one.ki == 0.0) { 1 } else { 2 }
     }
 
     /// Returns the proportional gain around the loop [rad/s].
     pub(crate) fn proportional(&self) -> f64 {
-        self.kp * self.gain
+        self.all().map(|one| one.kp * one.gain).sum()
+    }
+
+    /// Returns the loop and those beside it.
+    fn all(&self) -> impl Iterator<Item = &Self> {
+        std::iter::once(self).chain(&self.beside)
     }
 
     /// Returns whether the motion increases the error.
@@ -79,14 +94,15 @@ impl Loop {
 
     /// Returns how long the error of a steady ramp is ahead [s]: the lag of `kp` without an integral, and all delays.
     pub(crate) fn ramp_lag(&self) -> f64 {
-        let lag = if self.ki == 0.0 { 1.0 / self.proportional() } else { 0.0 };
+        let lag = if self.integrators() == 1 { 1.0 / self.proportional() } else { 0.0 };
         lag + self.latency + self.shapes.iter().map(|shape| shape.delay(self.period)).sum::<f64>()
     }
 
     /// Returns L at a circular frequency [rad/s].
     pub(crate) fn open(&self, omega: f64) -> Complex<f64> {
         let model = self.known(omega) * arm(omega, self.resonance) * turn(omega * self.latency) * self.gain;
-        model * between(&self.measured, omega)
+        let beside: Complex<f64> = self.beside.iter().map(|other| other.open(omega)).sum();
+        model * between(&self.measured, omega) + beside
     }
 
     /// Returns the response of controller, travel and filters, which a graph states.
@@ -197,14 +213,8 @@ mod tests {
             kp: 0.5,
             ki: 0.4,
             kd: 0.02,
-            measured: None,
-            setpoint: None,
-            jacobian: String::new(),
-            pid: None,
-            compared: None,
-            schedule: None,
             filters: [Shape::Mean { samples: 10.0 }, Shape::LowPass { time: 0.1 }].map(filter).into(),
-            gates: Vec::new(),
+            ..Feature::default()
         };
         let around = Loop::new(&feature, &answer, 0.0, 0.004);
         for samples in [400, 200, 100, 50, 20] {

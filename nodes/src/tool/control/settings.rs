@@ -64,8 +64,17 @@ impl<'a> Nodes<'a> {
         self.index.nodes.get(name).copied()
     }
 
-    /// Returns whether a flag is set in this mode, if it is the flag of a mode.
+    /// Returns whether a flag is set in this mode, if it is the flag of a mode, or made of such flags.
     pub(crate) fn is_set(&self, flag: &str) -> Option<bool> {
+        if let Some(node) = self.writer(flag) {
+            let mut flags = node.wires.iter().map(|wire| self.is_set(&wire.source));
+            return match node.kind.text.as_str() {
+                "not" => flags.next()?.map(|is_set| !is_set),
+                "any" => flags.try_fold(false, |any, is_set| Some(any || is_set?)),
+                "all" => flags.try_fold(true, |all, is_set| Some(all && is_set?)),
+                _ => None,
+            };
+        }
         let mode = self.index.outline.modes.iter().find(|mode| flag == mode_flag(&mode.name))?;
         Some(self.mode.is_some_and(|own| own.name == mode.name))
     }

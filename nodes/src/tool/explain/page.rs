@@ -74,7 +74,9 @@ fn law(mode: &ModeLaw, style: &Style) -> String {
         text += &style.table(&[&[HEAD.map(str::to_owned)], &rows[..]].concat(), 1, 8);
         text += "Speeds in m/s and rad/s for an error of one unit (setpoint - measured), by kp.\n";
     }
-    text += &law.features.iter().filter(|one| one.moves()).filter_map(scheduled).collect::<String>();
+    let moving = || law.features.iter().filter(|one| one.moves());
+    text += &moving().flat_map(|one| one.schedules.iter().map(|schedule| scheduled(one, schedule))).collect::<String>();
+    text += &moving().filter_map(together).collect::<String>();
     let off: Vec<String> =
         law.features.iter().filter(|one| !one.moves()).map(|one| format!("`{}`", one.name)).collect();
     if !off.is_empty() {
@@ -102,14 +104,25 @@ fn law(mode: &ModeLaw, style: &Style) -> String {
 }
 
 /// Says what multiplies the gains of a feature.
-fn scheduled(feature: &Feature) -> Option<String> {
-    let Schedule { node, min, max, nominal } = feature.schedule.as_ref()?;
+fn scheduled(feature: &Feature, schedule: &Schedule) -> String {
+    let Schedule { node, min, max, nominal } = schedule;
     let range = format!("from {} to {}", number(*min), number(*max));
     let by = match nominal {
         Some(nominal) => format!("by {} over the answer of the contact to vz, {range}", number(*nominal)),
         None => format!("{range}, by what this command does not know: there are no margins"),
     };
-    Some(format!("`{node}` multiplies the gains of `{}` {by}.\n", feature.name))
+    format!("`{node}` multiplies the gains of `{}` {by}.\n", feature.name)
+}
+
+/// Says what else answers the same measurement.
+fn together(feature: &Feature) -> Option<String> {
+    let measured = feature.measured.as_ref().filter(|_| !feature.beside.is_empty())?;
+    let others: Vec<String> =
+        feature.beside.iter().map(|other| format!("`{}` of `{}`", other.name, other.jacobian)).collect();
+    let (name, jacobian, others) = (&feature.name, &feature.jacobian, others.join(" and "));
+    Some(format!(
+        "`{name}` of `{jacobian}` and {others} answer `{measured}` together: their margins are those of the sum.\n"
+    ))
 }
 
 fn approach(approach: &Approach) -> String {

@@ -34,7 +34,7 @@ pub(super) fn stability(declared: &[Contact], law: &Law, period: f64) -> Vec<Sta
             object: Some(contact.object.clone()).filter(|object| !object.is_empty()),
             feature: feature.name.clone(),
             by_geometry: feature.quantity().is_some_and(|quantity| contact.is_by_geometry(quantity)),
-            is_unknown: feature.schedule.as_ref().is_some_and(|schedule| schedule.nominal.is_none()),
+            is_unknown: feature.schedules.iter().any(|schedule| schedule.nominal.is_none()),
             margins: Loop::over(feature, contact, period).map(|around| margins(&around)),
         })
     });

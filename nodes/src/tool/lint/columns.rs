@@ -10,11 +10,13 @@ use super::rows::{Answer, Row};
 use super::{Controlled, ModeLaw};
 use crate::motion::COMPONENTS;
 use crate::tool::control::contacts::Contact;
-use crate::tool::control::law::{Feature, law};
+use crate::tool::control::law::{Feature, Law, law};
 use crate::tool::control::settings::{Nodes, source};
 
 /// Largest angle between a line and an axis of the sensor along which the line lies [rad].
 const ALONG: f64 = 0.35;
+/// Largest radius of an object that a pad rolls on [m].
+const LARGEST_RADIUS: f64 = 0.1;
 
 pub(super) fn check(arm: &Controlled<'_>, found: &mut Diagnostics) {
     for mode in &arm.modes {
@@ -40,9 +42,11 @@ fn wrong(arm: &Controlled<'_>, mode: &ModeLaw<'_>, feature: &Feature) -> Option<
         // What the bench says about this object counts more than geometry.
         let said = arm.contacts.iter().filter_map(|contact| contact.features.get(quantity));
         let is_said = said.map(|answer| answer.row()).any(|row| row[answer.component] * answer.sign < 0.0);
-        feature.column[answer.component] * answer.sign < 0.0 && !is_said
+        feature.column[answer.component] * answer.sign < 0.0
+            && !is_said
+            && !is_outweighed(&row, &feature.column, answer)
     };
-    let first = row.known.iter().find(is_reversed)?;
+    let Some(first) = row.known.iter().find(is_reversed) else { return reversed(arm, mode, feature) };
     let name = COMPONENTS[first.component];
     // Of what is not selected, too.
     let mut right = column;
@@ -54,6 +58,15 @@ fn wrong(arm: &Controlled<'_>, mode: &ModeLaw<'_>, feature: &Feature) -> Option<
         feature.name, column[first.component], first.reason
     );
     Some(replaced(mode, feature, message, right))
+}
+
+/// Returns whether a column rolls the sensor the wrong way, but less than it slides the right way on any object.
+fn is_outweighed(row: &Row, column: &[f64; 6], answer: &Answer) -> bool {
+    let rolls = answer.component > 2;
+    let slides = row.known.iter().filter(|other| other.component < 3);
+    rolls
+        && slides.map(|other| column[other.component] * other.sign).sum::<f64>()
+            > column[answer.component].abs() * LARGEST_RADIUS
 }
 
 /// Returns the warning about a column that increases the error of a feature of which only the bench says how it answers.
@@ -166,23 +179,27 @@ fn projectors<'a>(nodes: &Nodes<'a>, port: &str) -> Vec<&'a OutlinedBlock> {
     }
 }
 
-/// Returns the warnings about components that a projector selects and that no column moves.
+/// Returns the warnings about components that a projector selects and that nothing moves.
 fn idle(arm: &Controlled<'_>, mode: &ModeLaw<'_>) -> Diagnostics {
-    projectors(&mode.nodes, &arm.twist).into_iter().flat_map(|projector| idle_axes(mode, projector)).collect()
+    projectors(&mode.nodes, &arm.twist).into_iter().flat_map(|projector| idle_axes(arm, mode, projector)).collect()
 }
 
-fn idle_axes(mode: &ModeLaw<'_>, projector: &OutlinedBlock) -> Diagnostics {
+fn idle_axes(arm: &Controlled<'_>, mode: &ModeLaw<'_>, projector: &OutlinedBlock) -> Diagnostics {
     let select = mode.nodes.node(&projector.name).and_then(|node| mode.nodes.value(node, "select"));
     let behind = source(projector, "twist").map(|twist| law(&mode.nodes, twist));
     let Some((setting, behind)) = select.zip(behind) else { return Diagnostics::new() };
     let Some(select) = setting.value.read::<[f64; 6]>() else { return Diagnostics::new() };
-    // All components: the projector selects nothing. A constant motion may be that of another mode.
+    // All components: the projector selects nothing.
     let selects_all = select.iter().all(|entry| *entry != 0.0);
-    let only_columns = behind.guidance.is_empty() && !behind.features.is_empty() && !behind.has_constants;
-    if selects_all || !only_columns {
+    if selects_all || !behind.guidance.is_empty() || behind.features.is_empty() {
         return Diagnostics::new();
     }
-    let is_idle = |i: &usize| select[*i] != 0.0 && behind.features.iter().all(|feature| feature.column[*i] == 0.0);
+    // A component without a motion here may be selected for that of another mode.
+    let twist = source(projector, "twist").unwrap_or_default();
+    let laws: Vec<Law> = arm.modes.iter().map(|mode| law(&mode.nodes, twist)).collect();
+    let is_driven = |i: usize| laws.iter().flat_map(|law| &law.constants).any(|constant| constant.twist[i] != 0.0);
+    let columns = || laws.iter().flat_map(|law| &law.features).map(|feature| &feature.column);
+    let is_idle = |i: &usize| select[*i] != 0.0 && columns().all(|column| column[*i] == 0.0) && !is_driven(*i);
     let jacobians: BTreeSet<&str> = behind.features.iter().map(|feature| &*feature.jacobian).collect();
     let jacobians: Vec<String> = jacobians.into_iter().map(|name| format!("`{name}`")).collect();
     let report = |i: usize| {
@@ -212,6 +229,10 @@ fn unused(arm: &Controlled<'_>) -> Diagnostics {
         let mut features = arm.modes.iter().flat_map(|mode| &mode.law.features);
         features.any(|feature| feature.name == wanted.name && feature.pid == wanted.pid && feature.moves())
     };
+    let is_selected = |wanted: &Feature| {
+        let mut features = arm.modes.iter().flat_map(|mode| &mode.law.features);
+        features.any(|one| one.name == wanted.name && one.pid == wanted.pid && one.column != [0.0; 6])
+    };
     let features = first.law.features.iter().filter(|feature| feature.has_gain());
     let dead = features.filter(|feature| !controls(feature) && !is_along_line(arm, feature));
     let found = dead.filter_map(|feature| {
@@ -224,14 +245,44 @@ fn unused(arm: &Controlled<'_>) -> Diagnostics {
                 format!("the column of `{}` is zero, so its gains do nothing", feature.name),
                 "write how the sensor should move for it, or remove the feature".to_owned(),
             ),
+            false if is_selected(feature) => (
+                format!(
+                    "`{0}` has gains only where no component of its column is selected: they do nothing",
+                    feature.name
+                ),
+                format!("give `{}` a gain in a mode that selects its column, or remove the feature", feature.name),
+            ),
             false => (
                 format!("no mode selects a component of the column of `{}`, so its gains do nothing", feature.name),
-                format!("select {} in a projector, or remove the feature", answers.unwrap_or_else(|| moved(&column))),
+                format!(
+                    "select {} in a projector, {}",
+                    answers.unwrap_or_else(|| moved(&column)),
+                    without(arm, feature)
+                ),
             ),
         };
         Some(Diagnostic::new(Code::UnusedColumn, first.place_of_column(feature), message).help(help))
     });
     found.collect()
+}
+
+/// Returns how to do without the gains of a feature.
+fn without(arm: &Controlled<'_>, feature: &Feature) -> String {
+    match is_watched(arm, feature) {
+        true => {
+            format!("or measure the error of `{}` in a `feature_error` of its own, which no `pid` reads", feature.name)
+        }
+        false => "or remove the feature".into(),
+    }
+}
+
+/// Returns whether an exit of a mode waits for the error of a feature.
+fn is_watched(arm: &Controlled<'_>, feature: &Feature) -> bool {
+    let Some(error) = feature.compared.as_ref().map(|node| format!("{node}.error.{}", feature.name)) else {
+        return false;
+    };
+    let exits = arm.modes.iter().flat_map(|mode| ["go", "done"].into_iter().flat_map(|kind| mode.tables(kind)));
+    exits.filter_map(|exit| exit.as_table()?.get("when")?.as_str()).any(|port| error.ends_with(port))
 }
 
 /// Returns whether a feature is the position along a line whose direction the task controls. Such a position has no
@@ -243,12 +294,21 @@ fn is_along_line(arm: &Controlled<'_>, feature: &Feature) -> bool {
 
 /// Returns the position along the line that a mode holds at an angle, `x` or `y`; `None` without a line, or if it lies
 /// along neither axis.
-pub(super) fn line_axis(mode: &ModeLaw<'_>) -> Option<&'static str> {
-    let mut lines = mode.moving().filter(|feature| mode.quantity(feature) == Some("orientation"));
-    let angle = lines.find_map(|feature| feature.setpoint)?.rem_euclid(PI);
-    match angle {
-        _ if (angle - FRAC_PI_2).abs() < ALONG => Some("y"),
-        _ if !(ALONG..=PI - ALONG).contains(&angle) => Some("x"),
+fn line_axis(mode: &ModeLaw<'_>) -> Option<&'static str> {
+    match line_positions(mode)[..] {
+        [axis] => Some(axis),
         _ => None,
+    }
+}
+
+/// Returns the positions that change along the line that a mode holds at an angle: both, if it lies along neither axis,
+/// and none without a line.
+pub(super) fn line_positions(mode: &ModeLaw<'_>) -> Vec<&'static str> {
+    let mut lines = mode.moving().filter(|feature| mode.quantity(feature) == Some("orientation"));
+    let Some(angle) = lines.find_map(|feature| feature.setpoint) else { return Vec::new() };
+    match angle.rem_euclid(PI) {
+        angle if (angle - FRAC_PI_2).abs() < ALONG => vec!["y"],
+        angle if !(ALONG..=PI - ALONG).contains(&angle) => vec!["x"],
+        _ => vec!["x", "y"],
     }
 }

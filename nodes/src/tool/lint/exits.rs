@@ -13,26 +13,52 @@ pub(super) struct Exit<'a> {
 }
 
 impl ModeLaw<'_> {
-    /// Returns the exits of a kind that lead to other modes.
-    pub(super) fn exits(&self, kind: &'static str) -> impl Iterator<Item = Exit<'_>> {
+    /// Returns the tables of the exits of a kind.
+    pub(super) fn tables(&self, kind: &'static str) -> impl Iterator<Item = &Value> {
         let settings = self.mode.iter().flat_map(|mode| &mode.settings).filter(move |setting| setting.path == kind);
-        let each = settings.flat_map(|setting| match &setting.value.item {
+        settings.flat_map(|setting| match &setting.value.item {
             Item::Array(exits) => exits.iter().collect(),
             _ => vec![&setting.value],
-        });
-        each.filter_map(|value| Some(Exit { to: value.as_table()?.get("to")?.as_str()?, value }))
+        })
+    }
+
+    /// Returns the exits of a kind that lead to other modes.
+    pub(super) fn exits(&self, kind: &'static str) -> impl Iterator<Item = Exit<'_>> {
+        self.tables(kind).filter_map(|value| Some(Exit { to: value.as_table()?.get("to")?.as_str()?, value }))
     }
 
     /// Returns the exits that are taken when the contact is lost.
     pub(super) fn lost(&self) -> impl Iterator<Item = Exit<'_>> {
-        self.exits("on_lost").chain(self.exits("go").filter(Exit::is_lost))
+        self.exits("on_lost").chain(self.releases())
+    }
+
+    /// Returns the exits that wait until there is no contact.
+    pub(super) fn releases(&self) -> impl Iterator<Item = Exit<'_>> {
+        self.exits("go").filter(Exit::is_lost)
+    }
+
+    /// Returns whether any exit waits for the value of a port.
+    pub(super) fn watches(&self) -> bool {
+        let exits = ["go", "done", "fail"].into_iter().flat_map(|kind| self.tables(kind));
+        exits.filter_map(Value::as_table).any(|exit| exit.get("when").is_some())
+    }
+
+    /// Returns whether an exit waits for a contact.
+    pub(super) fn waits_for_contact(&self) -> bool {
+        let is_found =
+            |exit: &Exit<'_>| exit.word("when").is_some_and(|port| port.ends_with(".present")) && !exit.is_lost();
+        self.exits("go").any(|exit| is_found(&exit))
     }
 }
 
 impl Exit<'_> {
     /// Returns whether a `go` waits until there is no contact.
     fn is_lost(&self) -> bool {
-        let word = |key: &str| self.value.as_table()?.get(key)?.as_str();
-        word("when").is_some_and(|port| port.ends_with(".present")) && matches!(word("is"), Some("false" | "absent"))
+        let is_contact = self.word("when").is_some_and(|port| port.ends_with(".present"));
+        is_contact && matches!(self.word("is"), Some("false" | "absent"))
+    }
+
+    fn word(&self, key: &str) -> Option<&str> {
+        self.value.as_table()?.get(key)?.as_str()
     }
 }

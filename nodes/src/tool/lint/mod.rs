@@ -9,6 +9,7 @@ mod columns;
 mod exits;
 mod gains;
 mod modes;
+mod opposed;
 mod presence;
 mod recovery;
 mod rows;
@@ -23,7 +24,7 @@ use tactflow_runtime::source::{Code, Diagnostics};
 
 use super::control::chain::{Limiter, chain};
 use super::control::contacts::{Contact, contacts};
-use super::control::law::{Feature, Law, law};
+use super::control::law::{Feature, Guidance, Law, law};
 use super::control::settings::{Index, Nodes, commands};
 
 /// An arm and what moves it.
@@ -60,9 +61,12 @@ pub(crate) fn lint(outline: &Outline, facts: &[(String, toml::Value)]) -> Diagno
     for (command, port) in &commands {
         let arm = command.split('.').next().unwrap_or_default();
         found.extend(unread::check(outline, facts, arm));
+        let name = arm;
         let Some(arm) = controlled((outline, &index, &carried), facts, (command, port)) else { continue };
+        found.extend(unread::misnamed(outline, &arm, name));
         let before = found.len();
         modes::check(&arm, &mut found);
+        opposed::check(&arm, &mut found);
         recovery::check(&arm, &mut found);
         presence::check(&arm, &mut found);
         columns::check(&arm, &mut found);
@@ -82,9 +86,11 @@ pub(crate) fn lint(outline: &Outline, facts: &[(String, toml::Value)]) -> Diagno
 fn without_consequences(mut found: Diagnostics) -> Diagnostics {
     let has = |code: Code| found.iter().any(|one| one.code == code);
     let (has_wrong, rolls) = (has(Code::WrongColumn), has(Code::UnforcedRolling));
+    let is_along_line = has(Code::LinePosition);
     found.retain(|one| match one.code {
         Code::IdleAxis => !has_wrong,
         Code::UnusedColumn => !has_wrong && !rolls,
+        Code::OpposedMotion => !is_along_line,
         _ => true,
     });
     found
@@ -115,11 +121,23 @@ fn controlled<'a>(
     Some(Controlled { outline, task, limits, twist, contacts, modes })
 }
 
+impl Controlled<'_> {
+    /// Returns whether a feature has a gain in any mode.
+    fn has_gain(&self, feature: &Feature) -> bool {
+        let mut features = self.modes.iter().flat_map(|mode| &mode.law.features);
+        features.any(|other| other.name == feature.name && other.pid == feature.pid && other.has_gain())
+    }
+}
+
 impl ModeLaw<'_> {
     /// Returns what a feature measures, such as `x`, if it comes from a sensor on an arm, by a node whose geometry is
     /// known.
     fn quantity<'f>(&self, feature: &'f Feature) -> Option<&'f str> {
-        let port = feature.measured.as_deref()?;
+        self.quantity_of(feature.measured.as_deref()?)
+    }
+
+    /// Returns what a port measures, under the same conditions.
+    fn quantity_of<'p>(&self, port: &'p str) -> Option<&'p str> {
         let node = self.nodes.writer(port)?;
         let frame = node.outputs.iter().find(|output| output.name == port)?.frames.first()?.as_deref()?;
         let is_known = ["moments", "principal_axes", "hough", "curvature"].contains(&&*node.kind.text)
@@ -148,6 +166,12 @@ impl ModeLaw<'_> {
         let Some(node) = self.nodes.node(node) else { return NO_SPAN };
         let written = self.nodes.value(node, path).map(|setting| setting.value.span.clone());
         written.filter(|span| *span != NO_SPAN).unwrap_or_else(|| node.span.clone())
+    }
+
+    /// Returns whether a node that guides the sensor has a speed of 0 in this mode.
+    fn rests(&self, guide: &Guidance) -> bool {
+        let node = self.nodes.node(guide.node());
+        node.and_then(|node| self.nodes.number(node, "speed_m_per_s")) == Some(0.0)
     }
 
     /// Returns the start of a message about this mode.

@@ -2,7 +2,9 @@
 
 use tactflow_runtime::source::{Code, Diagnostic, Diagnostics};
 
+use super::modes::force_limit;
 use super::{Controlled, ModeLaw};
+use crate::tool::control::filters::way;
 use crate::tool::control::law::Feature;
 use crate::tool::control::settings::source;
 
@@ -11,11 +13,11 @@ pub(super) fn check(arm: &Controlled<'_>, found: &mut Diagnostics) {
     let passes = |wanted: &Feature| {
         let each = arm.modes.iter().flat_map(|mode| mode.moving().map(move |feature| (mode, feature)));
         each.filter(|(_, feature)| feature.name == wanted.name && feature.pid == wanted.pid)
-            .any(|(mode, feature)| barred(mode, feature).is_none())
+            .any(|(mode, feature)| barred(arm, mode, feature).is_none())
     };
     for mode in &arm.modes {
         for feature in mode.moving().filter(|feature| !passes(feature)) {
-            let Some((gate, why)) = barred(mode, feature) else { continue };
+            let Some((gate, why)) = barred(arm, mode, feature) else { continue };
             let message = format!("`{}` has gains, but it is never present: it passes `{gate}`, {why}", feature.name);
             let help =
                 format!("let a gate of `{}` open in a mode that selects its column, or remove its gains", feature.name);
@@ -25,12 +27,30 @@ pub(super) fn check(arm: &Controlled<'_>, found: &mut Diagnostics) {
 }
 
 /// Returns the flag that keeps a feature from moving the sensor in a mode, and why.
-fn barred<'f>(mode: &ModeLaw<'_>, feature: &'f Feature) -> Option<(&'f str, String)> {
+fn barred<'f>(arm: &Controlled<'_>, mode: &ModeLaw<'_>, feature: &'f Feature) -> Option<(&'f str, String)> {
     feature.gates.iter().find_map(|gate| match mode.nodes.is_set(gate) {
         Some(true) => None,
         Some(false) => Some((&**gate, "which is set in another mode only".to_owned())),
-        None => is_without_contact(mode, gate).then(|| (&**gate, "which is set without a contact only".to_owned())),
+        None if is_without_contact(mode, gate) => Some((&**gate, "which is set without a contact only".to_owned())),
+        None => Some((&**gate, out_of_reach(arm, mode, gate)?)),
     })
+}
+
+/// Returns why a comparison never sets its flag: it needs a larger force than the task or a limit allows.
+fn out_of_reach(arm: &Controlled<'_>, mode: &ModeLaw<'_>, flag: &str) -> Option<String> {
+    let node = mode.nodes.writer(flag).filter(|node| node.kind.text == "compare")?;
+    let above = mode.nodes.number(node, "above")?;
+    let port = way(&mode.nodes, source(node, "value")?).measured;
+    let quantity = mode.quantity_of(&port)?;
+    let (limit, key) = force_limit(arm, mode, quantity)?;
+    let held = mode.moving().find(|feature| feature.measured.as_ref() == Some(&port));
+    match held.and_then(|feature| feature.setpoint) {
+        _ if above >= limit => Some(format!("which is set above {above}, where the limit `{key}` is {limit}")),
+        Some(setpoint) if above > setpoint => {
+            Some(format!("which is set above {above}, where `{quantity}` is held at {setpoint}"))
+        }
+        _ => None,
+    }
 }
 
 /// Returns whether a flag is the opposite of a contact.

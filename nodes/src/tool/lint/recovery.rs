@@ -6,15 +6,26 @@ use tactflow_runtime::source::{Code, Diagnostic, Diagnostics};
 
 use super::exits::Exit;
 use super::{Controlled, ModeLaw};
+use crate::tool::control::law::Guidance;
+use crate::tool::control::settings::source;
 
 impl ModeLaw<'_> {
-    fn own_name(&self) -> &str {
+    pub(super) fn own_name(&self) -> &str {
         self.mode.map_or("", |mode| mode.name.rsplit('.').next().unwrap_or_default())
     }
 
     /// Returns the speed along +z with which the mode moves the sensor whatever it feels [m/s].
     fn approach(&self) -> f64 {
-        self.law.constants.iter().map(|constant| constant.twist[2]).sum()
+        let constant: f64 = self.law.constants.iter().map(|constant| constant.twist[2]).sum();
+        let composed = self.law.guidance.iter().filter(|guide| guide.kind == "compose_twist" && guide.passes[2]);
+        constant + composed.filter_map(|guide| self.generated(guide)).sum::<f64>()
+    }
+
+    /// Returns the largest speed along z that a `signal_generator` gives to a composed twist [m/s].
+    fn generated(&self, guide: &Guidance) -> Option<f64> {
+        let generator = self.nodes.writer(source(self.nodes.node(guide.node())?, "vz")?)?;
+        let number = |key: &str| self.nodes.number(generator, key).unwrap_or_default();
+        (generator.kind.text == "signal_generator").then(|| number("offset") + number("amplitude").abs())
     }
 }
 
@@ -27,7 +38,10 @@ pub(super) fn check(arm: &Controlled<'_>, found: &mut Diagnostics) {
     let Some((slow, first_speed)) = fastest(arm, &first).filter(|(_, speed)| *speed > 0.0) else { return };
     for mode in &arm.modes {
         found.extend(mode.lost().filter(|exit| !first.contains(exit.to)).filter_map(|exit| {
-            let (fast, again) = fastest(arm, &search(arm, exit.to, &first))?;
+            let search = search(arm, exit.to, &first);
+            // A task that backs off first approaches again from a distance.
+            let backs_off = search.iter().filter_map(|name| named(arm, name)).any(|mode| mode.approach() < 0.0);
+            let (fast, again) = fastest(arm, &search).filter(|_| !backs_off)?;
             (again > first_speed * (1.0 + 1e-9)).then(|| report(&exit, (fast, again), (slow, first_speed)))
         }));
     }
@@ -39,7 +53,8 @@ fn search<'a>(arm: &'a Controlled<'_>, from: &'a str, known: &BTreeSet<&str>) ->
     let (mut open, mut found) = (vec![from], BTreeSet::new());
     while let Some(name) = open.pop() {
         let Some(mode) = named(arm, name) else { continue };
-        let has_contact = mode.lost().next().is_some();
+        // The first mode begins without one, even if it notices a lost contact itself.
+        let has_contact = mode.lost().next().is_some() && name != from;
         if !has_contact && !known.contains(name) && found.insert(name) {
             open.extend(mode.exits("go").map(|exit| exit.to));
         }

@@ -58,10 +58,12 @@ fn is_known(mode: &ModeLaw<'_>, feature: &Feature, contacts: &[Contact]) -> bool
 
 /// Returns what makes the loops of two features the same.
 fn key(feature: &Feature) -> (String, String, Vec<u64>) {
-    let Feature { kp, ki, kd, .. } = *feature;
-    let numbers = feature.column.into_iter().chain([kp, ki, kd]);
-    let delays = feature.filters.iter().map(|filter| filter.delay_s);
-    (feature.jacobian.clone(), feature.name.clone(), numbers.chain(delays).map(f64::to_bits).collect())
+    let numbers = |one: &Feature| {
+        let delays = one.filters.iter().map(|filter| filter.delay_s);
+        one.column.into_iter().chain([one.kp, one.ki, one.kd]).chain(delays).map(f64::to_bits).collect::<Vec<_>>()
+    };
+    let all = std::iter::once(feature).chain(&feature.beside);
+    (feature.jacobian.clone(), feature.name.clone(), all.flat_map(numbers).collect())
 }
 
 fn judge(mode: &ModeLaw<'_>, feature: &Feature, contacts: &[Contact]) -> Option<Diagnostic> {
@@ -126,6 +128,17 @@ fn low_margin(mode: &ModeLaw<'_>, feature: &Feature, loops: &[(&Contact, Loop)],
         false => format!("the loop of `{name}` is unstable {}", over(low.object)),
     };
     let diagnostic = Diagnostic::new(Code::LowMargin, place, message);
+    let diagnostic = match slowest(feature).filter(|_| low.lag > MAX_LAG) {
+        Some((_, filter)) => diagnostic.note(
+            mode.place(&filter.node, ""),
+            format!("the filters delay `{name}` by {:.0} ms in all, most of them this one", feature.smoothing() * 1e3),
+        ),
+        None => diagnostic,
+    };
+    let diagnostic = feature.beside.iter().fold(diagnostic, |diagnostic, other| {
+        let note = format!("the loop of `{}` adds to it: both answer the same measurement", other.name);
+        diagnostic.note(mode.place_of_gain(other, "kp"), note)
+    });
     let loops: Vec<Loop> = loops.iter().map(|(_, around)| around.clone()).collect();
     let Some(factor) =
         factor(&loops, KEPT).filter(|factor| *factor < 1.0).and_then(|factor| quick(mode, feature, &loops, factor))
@@ -174,10 +187,14 @@ fn rounded(number: f64, round: impl Fn(f64) -> f64) -> f64 {
     format!("{exact:.4}").parse().unwrap_or(exact)
 }
 
+/// Returns the filter with the largest delay, and its number.
+fn slowest(feature: &Feature) -> Option<(usize, &Filter)> {
+    let filters = feature.filters.iter().enumerate().filter(|(_, filter)| filter.shape.smooths());
+    filters.max_by(|(_, one), (_, other)| one.delay_s.total_cmp(&other.delay_s))
+}
+
 fn slow_filter(mode: &ModeLaw<'_>, feature: &Feature, contacts: &[Contact], slow: &Found<'_>) -> Option<Diagnostic> {
-    let filters = feature.filters.iter().enumerate();
-    let filters = filters.filter(|(_, filter)| filter.shape.smooths());
-    let (i, slowest) = filters.max_by(|(_, one), (_, other)| one.delay_s.total_cmp(&other.delay_s))?;
+    let (i, slowest) = slowest(feature)?;
     let node = mode.nodes.node(&slowest.node)?;
     let keys = ["time_constant_ms", "cutoff_hz", "window_ms", "window"];
     let key = keys.into_iter().find(|key| mode.nodes.number(node, key).is_some());

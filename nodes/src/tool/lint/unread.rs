@@ -1,11 +1,13 @@
-//! Contacts of a bench that cannot be read, so that no loop is checked over them.
+//! Contacts of a bench that cannot be read, or that name a feature otherwise than its port: no loop is checked over them.
 
 use std::ops::Range;
 
 use tactflow_runtime::graph::{NO_SPAN, Outline};
-use tactflow_runtime::source::{Code, Diagnostic, Item, Value};
+use tactflow_runtime::source::{Code, Diagnostic, Diagnostics, Edit, Item, Value, suggest_name};
 
-use crate::tool::control::contacts::contacts;
+use super::Controlled;
+use crate::tool::control::contacts::{Contact, contacts};
+use crate::tool::control::law::Feature;
 
 /// Returns the warning about the contacts of an arm.
 pub(super) fn check(outline: &Outline, facts: &[(String, toml::Value)], arm: &str) -> Option<Diagnostic> {
@@ -15,6 +17,34 @@ pub(super) fn check(outline: &Outline, facts: &[(String, toml::Value)], arm: &st
     let place = value.map_or(NO_SPAN, |value| place(&name, arm, value, &why));
     let message = format!("no loop of `{arm}` is checked over a contact, because its contacts cannot be read");
     Some(Diagnostic::new(Code::UnusualValue, place, message).help(why))
+}
+
+/// Returns the warnings about features that the contacts of an arm call otherwise than their ports are called: as the
+/// graph calls them, or misspelt.
+pub(super) fn misnamed(outline: &Outline, arm: &Controlled<'_>, name: &str) -> Diagnostics {
+    let Some((_, value)) = outline.facts.iter().find(|(fact, _)| *fact == format!("{name}.contacts")) else {
+        return Diagnostics::new();
+    };
+    let is_port = |name: &str| {
+        let mut ports = outline.nodes.iter().flat_map(|node| &node.outputs);
+        ports.any(|port| port.name.rsplit('.').next() == Some(name))
+    };
+    let features = || arm.modes.iter().flat_map(|mode| mode.moving());
+    let meant = |key: &str, contact: &Contact| {
+        let own = features().find(|one| one.name == key).and_then(Feature::quantity);
+        let near = suggest_name(key, features().filter_map(Feature::quantity));
+        own.or(near).filter(|quantity| !contact.features.contains_key(*quantity))
+    };
+    let each = arm.contacts.iter().flat_map(|contact| contact.features.keys().map(move |key| (key, contact)));
+    let found = each.filter(|(key, _)| !is_port(key)).filter_map(|(key, contact)| {
+        let (quantity, place) = (meant(key, contact)?, key_in(value, key)?);
+        let message =
+            format!("no port is called `{key}`, so no loop is checked with this answer of `{}`", contact.object);
+        let help = format!("a contact names the port that is measured: write `{quantity}`");
+        let edit = Edit::Replace(place.clone(), quantity.to_owned());
+        Some(Diagnostic::new(Code::UnusualValue, place, message).help(help).edit(edit))
+    });
+    found.collect()
 }
 
 /// Returns the place of the mistake: the key that is not known, or the contact that cannot be read.
@@ -31,6 +61,9 @@ fn place(name: &str, arm: &str, value: &Value, why: &str) -> Range<usize> {
 
 /// Returns the place of a key in a value.
 fn key_in(value: &Value, wanted: &str) -> Option<Range<usize>> {
+    if let Item::Array(values) = &value.item {
+        return values.iter().find_map(|value| key_in(value, wanted));
+    }
     let entries = &value.as_table()?.entries;
     let own = entries.iter().find(|(key, _)| key.name == wanted).map(|(key, _)| key.span.clone());
     own.or_else(|| entries.iter().find_map(|(_, value)| key_in(value, wanted)))

@@ -264,7 +264,7 @@ impl Experiment<'_> {
         let Feature { kp, ki, kd, column, .. } = *self.feature;
         set.extend(gains(self.feature, self.mode, [kp, ki, kd].map(|gain| gain * self.share)));
         // Otherwise the gains would change while they are measured.
-        let schedule = self.feature.schedule.iter();
+        let schedule = self.feature.schedules.iter();
         set.extend(schedule.flat_map(|one| ["min", "max"].map(|key| format!("nodes.{}.{key}=1.0", one.node))));
         if column.iter().filter(|entry| **entry != 0.0).count() > 1 {
             let mut alone = [0.0; 6];

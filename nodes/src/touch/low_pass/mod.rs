@@ -2,7 +2,7 @@
 
 use std::f64::consts::PI;
 
-use tactflow_runtime::node::{At, Describe, Interval, Mistake, Mistakes, Node, Param, Setup, State, Tick};
+use tactflow_runtime::node::{At, Describe, Interval, Mistake, Mistakes, Node, Param, Reading, Setup, State, Tick};
 use tactflow_runtime::source::Code;
 
 use super::filter::{Averaging, Inputs, Outputs};
@@ -69,6 +69,7 @@ impl Node for LowPass {
     type State = State;
 
     fn new(params: Params, setup: &mut Setup<Self>) -> Result<Self, Mistakes> {
+        setup.reading = Reading::Same;
         let averaging = Averaging::new(&setup.inputs, &mut setup.outputs);
         match (params.time_constant_ms, params.cutoff_hz) {
             (Some(ms), None) => Ok(Self { time: ms * 1e-3, averaging }),

@@ -2,7 +2,7 @@
 
 use std::cmp::Ordering;
 
-use tactflow_runtime::node::{Describe, Mistakes, Node, Param, Setup, State, Tick};
+use tactflow_runtime::node::{Describe, Mistakes, Node, Param, Reading, Setup, State, Tick};
 
 use super::filter::{Inputs, Outputs, Ring};
 use crate::motion::axis::wrap_axial;
@@ -62,6 +62,7 @@ impl Node for Median {
     type State = State;
 
     fn new(params: Params, setup: &mut Setup<Self>) -> Result<Self, Mistakes> {
+        setup.reading = Reading::Same;
         setup.outputs.value.range = setup.inputs.value.range;
         Ok(Self { window: params.window, is_axial: setup.inputs.value.unit.is_axial() })
     }

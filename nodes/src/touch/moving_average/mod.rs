@@ -5,7 +5,7 @@
 
 mod mean;
 
-use tactflow_runtime::node::{Describe, Interval, Mistake, Mistakes, Node, Param, Setup, State, Tick};
+use tactflow_runtime::node::{Describe, Interval, Mistake, Mistakes, Node, Param, Reading, Setup, State, Tick};
 
 use super::filter::{Averaging, Inputs, Outputs, Ring};
 use mean::{TimedVector, mean};
@@ -79,6 +79,7 @@ impl Node for MovingAverage {
     type State = State;
 
     fn new(params: Params, setup: &mut Setup<Self>) -> Result<Self, Mistakes> {
+        setup.reading = Reading::Same;
         let averaging = Averaging::new(&setup.inputs, &mut setup.outputs);
         let (capacity, time) = match (params.window, params.window_ms) {
             (window, None) => (window.unwrap_or(DEFAULT_WINDOW), None),

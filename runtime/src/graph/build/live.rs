@@ -125,7 +125,7 @@ fn recipe(builder: &Builder<'_>, index: usize, place: usize) -> Option<Recipe> {
         return None;
     }
     let configurations = filled.iter().cloned().zip(wanted.iter().cloned()).collect();
-    let (given, _) = builder.built.get(&index)?.clone();
+    let (given, ..) = builder.built.get(&index)?.clone();
     let period = builder.opened.shortest_period(net.roles_of(Producer::Node(index))).unwrap_or(builder.period);
     Some(Recipe { place, kind: net.catalogue.nodes()[kind].clone(), spec: spec.clone(), given, period, configurations })
 }

@@ -7,6 +7,7 @@ use super::demand::{Demand, DemandChanges};
 use super::nodes::Builder;
 use crate::graph::check::generators::Motions;
 use crate::graph::check::live;
+use crate::graph::check::readings::Readings;
 use crate::graph::load::{Entity, FlatGraph};
 use crate::graph::plan::{PlannedExit, PlannedMode, PlannedNode, PlannedPort, PortRef};
 use crate::graph::syntax::{ModeBlock, default_max_age_ns};
@@ -19,6 +20,7 @@ pub(crate) struct BuiltModes {
     pub(crate) modes: Vec<PlannedMode>,
     /// The motion that each node generates.
     pub(crate) motions: Motions,
+    pub(crate) readings: Readings,
     /// The components that are read with the parameters of the graph.
     pub(crate) demand: Demand,
     /// For each mode, where it reads other components.
@@ -41,6 +43,7 @@ pub(crate) fn build_modes(builder: &mut Builder<'_>, nodes: &mut [PlannedNode]) 
     };
     let freezes = nodes.iter_mut().map(want).collect();
     let mut motions = Motions::new((0..places.len()).map(|node| builder.motion(node)).collect());
+    let readings = Readings::new((0..places.len()).map(|node| builder.reading(node)).collect());
     let (mut modes, mut demand_changes) = (Vec::new(), Vec::new());
     for (number, exits) in exits(builder, nodes).into_iter().enumerate() {
         let block = &net.flat.modes[number];
@@ -67,7 +70,7 @@ pub(crate) fn build_modes(builder: &mut Builder<'_>, nodes: &mut [PlannedNode]) 
         let configurations = adopt(block, variants, nodes, &places, &mut builder.diagnostics);
         modes.push(PlannedMode { name: net.flat.mode_name(number), exits, configurations });
     }
-    BuiltModes { modes, motions, demand, demand_changes, freezes }
+    BuiltModes { modes, motions, readings, demand, demand_changes, freezes }
 }
 
 /// Resolves the exits of each mode.

@@ -10,7 +10,7 @@ use crate::graph::load::MeasuredValues;
 use crate::graph::net::{CommandWire, Net, WireOrigin};
 use crate::graph::plan::{PlannedCommand, PlannedNode, PlannedPort, PlannedRole, PlannedWire, PortRef, Producer};
 use crate::graph::syntax::{AgeLimit, Policy, default_max_age_ns};
-use crate::node::{Built, Components, Configured, Given, Motion, Need, NodeSpec, PortSpec, frame_args};
+use crate::node::{Built, Components, Configured, Given, Motion, Need, NodeSpec, PortSpec, Reading, frame_args};
 use crate::signal::{FlagShape, Joint, Kind, Shape};
 use crate::source::{Code, Diagnostic, Diagnostics, Key, SourceMap, Value};
 
@@ -31,8 +31,8 @@ pub(crate) struct Builder<'a> {
     units: BTreeMap<usize, Units>,
     /// What determined the unit of each port.
     origins: BTreeMap<PortRef, UnitOrigin>,
-    /// The shapes from which each node was built, and the motion that it generates.
-    pub(super) built: BTreeMap<usize, (Given, Motion)>,
+    /// The shapes from which each node was built, the motion that it generates, and what it says about its input.
+    pub(super) built: BTreeMap<usize, (Given, Motion, Reading)>,
     /// The parameters of each configuration of each node, with all facts filled in.
     pub(super) filled: BTreeMap<usize, Vec<Value>>,
     /// The components of the outputs that are read of each configuration of each node.
@@ -226,7 +226,7 @@ impl Builder<'_> {
             ports.push(self.add_port(source, shape));
         }
         self.units.insert(index, units);
-        self.built.insert(index, (given, built.motion));
+        self.built.insert(index, (given, built.motion, built.reading));
         Some(PlannedNode {
             index,
             name: node.name.clone(),
@@ -255,13 +255,18 @@ impl Builder<'_> {
     /// Returns the motion that a node generates with the parameters of the graph.
     pub(crate) fn motion(&self, node: usize) -> Motion {
         // A node that could not be built has its own diagnostic.
-        self.built.get(&node).map_or(Motion::Still, |(_, motion)| *motion)
+        self.built.get(&node).map_or(Motion::Still, |(_, motion, _)| *motion)
+    }
+
+    /// Returns what a node says about its first input with the parameters of the graph.
+    pub(crate) fn reading(&self, node: usize) -> Reading {
+        self.built.get(&node).map_or(Reading::Other, |(.., reading)| *reading)
     }
 
     /// Builds a node again with other parameters, from the same input shapes; its output shapes must not change.
     pub(crate) fn variant(&mut self, index: usize, params: &Value) -> Option<Built> {
         let (kind, spec) = self.net.nodes[index]?;
-        let (given, _) = self.built.get(&index)?.clone();
+        let (given, ..) = self.built.get(&index)?.clone();
         let (configured, params) = self.configure(index, kind, params, &given, true);
         let mut built = self.build(index, configured, &params, given)?;
         let node = &self.net.flat.nodes[index];

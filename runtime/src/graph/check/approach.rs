@@ -33,7 +33,7 @@ pub(crate) fn check(
         let is_set = || all.iter().any(|node| net.setting(i, *node).is_some());
         // A task may wait at rest until it is touched, and move in other modes.
         let is_meant_to_move = is_bounded || is_always_still || is_set();
-        if moving.is_empty() && is_meant_to_move && !all.is_empty() {
+        if moving.is_empty() && is_meant_to_move && !all.is_empty() && !motions.wakes(i) {
             diagnostics.push(report(net, i, &all, true));
         } else if !moving.is_empty() && moving.iter().all(|node| motions.of(i, *node) == Motion::Retreat) {
             diagnostics.push(report(net, i, moving, false));

@@ -4,6 +4,7 @@ use std::collections::BTreeSet;
 
 use super::contact::ContactPorts;
 use super::immediate::{Ways, stays};
+use super::readings::Readings;
 use crate::graph::net::Net;
 use crate::graph::plan::{Condition, PlannedExit, PlannedMode, PortRef, Producer, Test, WatchedPort};
 use crate::graph::syntax::{ExitKind, PortState};
@@ -28,7 +29,7 @@ const GAP: f64 = 0.2;
 ///
 /// A mode that ends as soon as it begins has its own warning. `period` is that of the graph [s].
 pub(crate) fn check(
-    net: &Net<'_>,
+    (net, readings): (&Net<'_>, &Readings),
     contact: &ContactPorts,
     modes: &[PlannedMode],
     period: f64,
@@ -40,7 +41,8 @@ pub(crate) fn check(
     let mut marked = BTreeSet::new();
     let back = |ring: &[Step<'_>]| ring.last().map(|step| (step.from, step.exit.span.start));
     for ring in rings(modes) {
-        let Some(cause) = cause(&ring).filter(|cause| cause.is_fast(&ring, period)) else { continue };
+        let conditions: Vec<Condition> = ring.iter().map(|step| readings.origin(net, &step.exit.condition)).collect();
+        let Some(cause) = cause(&conditions).filter(|cause| cause.is_fast(&ring, period)) else { continue };
         let is_reported = ring.iter().any(|step| ways.immediate(step.from, step.exit).is_some());
         if !is_reported && cause.stays(net, contact, &ring) && marked.insert(back(&ring)) {
             diagnostics.push(report(modes, &ring, help(&ring, cause, period)));
@@ -115,9 +117,11 @@ impl Cause {
 
     /// Returns whether no mode of a ring removes the cause: none changes the port that the ring watches.
     fn stays(self, net: &Net<'_>, contact: &ContactPorts, ring: &[Step<'_>]) -> bool {
-        let Some(port) = ring.iter().find_map(|step| step.exit.condition.port()) else { return true };
-        let is_possible = self != Self::Contact || contact.need(net, port) && is_raw(net, port);
-        is_possible && ring.iter().all(|step| stays(net, ring[0].from, step.from, port))
+        let mut ports = ring.iter().filter_map(|step| step.exit.condition.port());
+        ports.all(|port| {
+            let is_possible = self != Self::Contact || contact.need(net, port) && is_raw(net, port);
+            is_possible && ring.iter().all(|step| stays(net, ring[0].from, step.from, port))
+        })
     }
 }
 
@@ -131,11 +135,11 @@ fn is_raw(net: &Net<'_>, flag: PortRef) -> bool {
     }
 }
 
-/// Returns why the exits of a ring can follow each other at once: there is a value that fulfils all of them, or that
-/// noise lets fulfil all of them.
-fn cause(ring: &[Step<'_>]) -> Option<Cause> {
-    let conditions = ring.iter().map(|step| &step.exit.condition);
-    let tests: Vec<&Condition> = conditions.filter(|condition| !matches!(condition, Condition::Elapsed(_))).collect();
+/// Returns why the exits of a ring with these conditions can follow each other at once: there is a value that fulfils
+/// all of them, or that noise lets fulfil all of them.
+fn cause(ring: &[Condition]) -> Option<Cause> {
+    let is_test = |condition: &&Condition| !matches!(condition, Condition::Elapsed(_));
+    let tests: Vec<&Condition> = ring.iter().filter(is_test).collect();
     let has_timeout = tests.len() < ring.len();
     match tests[..] {
         [] => Some(Cause::Time),
@@ -212,10 +216,20 @@ fn help(ring: &[Step<'_>], cause: Cause, period: i64) -> String {
                 "leave a gap, so that noise does not switch back: for example {bound}. `hysteresis` leaves none: it \
                  counts within one mode"
             ),
+            None if is_flag(there) || is_flag(back) => {
+                "let the node that sets the flag leave a gap that is wider than the noise: `hysteresis` in a comparison, or \
+                 another bound on the way back"
+                    .into()
+            }
             None => "leave a gap between the two bounds that is wider than the noise".into(),
         },
         _ => "leave a gap between two of the bounds, so that no value is within all of them".into(),
     }
+}
+
+/// Returns whether an exit waits for a flag.
+const fn is_flag(step: &Step<'_>) -> bool {
+    matches!(step.exit.condition, Condition::Port(_, Test::Is(_)))
 }
 
 /// Returns the bound on the way back that leaves a gap to the bounds on the way there.
@@ -269,7 +283,8 @@ mod tests {
 
     fn chatter(exits: &[PlannedExit]) -> Option<Cause> {
         let ring: Vec<Step<'_>> = exits.iter().enumerate().map(|(from, exit)| Step { from, exit }).collect();
-        cause(&ring).filter(|cause| cause.is_fast(&ring, PERIOD))
+        let conditions: Vec<Condition> = exits.iter().map(|exit| exit.condition.clone()).collect();
+        cause(&conditions).filter(|cause| cause.is_fast(&ring, PERIOD))
     }
 
     #[test]

@@ -29,6 +29,11 @@ impl Motions {
         self.changes.push(changes);
     }
 
+    /// Returns whether a mode lets a node move the sensor that is still otherwise.
+    pub(super) fn wakes(&self, mode: usize) -> bool {
+        self.changes[mode].iter().any(|(node, motion)| self.usual[*node] == Motion::Still && *motion != Motion::Still)
+    }
+
     /// Returns the motion of a node in a mode.
     pub(super) fn of(&self, mode: usize, node: usize) -> Motion {
         self.changes[mode].get(&node).copied().unwrap_or(self.usual[node])

@@ -32,6 +32,7 @@ pub(crate) mod parts;
 pub(crate) mod policy;
 pub(crate) mod quantities;
 pub(crate) mod reachability;
+pub(crate) mod readings;
 pub(crate) mod record;
 mod second_guard;
 pub(crate) mod silence;

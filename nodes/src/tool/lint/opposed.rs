@@ -1,0 +1,110 @@
+//! Motions that work against each other in one mode, and motions into an object that is already pressed.
+
+use tactflow_runtime::source::{Code, Diagnostic, Diagnostics};
+
+use super::modes::GUIDES;
+use super::{Controlled, ModeLaw};
+use crate::motion::COMPONENTS;
+use crate::tool::control::law::{Feature, Guidance};
+use crate::tool::control::settings::source;
+
+pub(super) fn check(arm: &Controlled<'_>, found: &mut Diagnostics) {
+    for mode in &arm.modes {
+        found.extend(retreat(mode).or_else(|| held(mode)).or_else(|| push(arm, mode)));
+    }
+}
+
+/// Returns the warning about a force that is controlled while the sensor moves away from the object: the contact does not
+/// end.
+fn retreat(mode: &ModeLaw<'_>) -> Option<Diagnostic> {
+    let (node, speed) = away(mode)?;
+    let presses = |feature: &&Feature| {
+        let is_force = matches!(mode.quantity(feature), Some("pressure" | "force"));
+        let most = feature.setpoint.map(|setpoint| feature.kp * feature.column[2] * setpoint);
+        is_force && most.is_some_and(|most| most >= speed)
+    };
+    let feature = mode.moving().find(presses)?;
+    let message = format!(
+        "{}`{node}` moves the sensor away from the object, but `{}` presses it back: the contact does not end",
+        mode.named(),
+        feature.name
+    );
+    Some(report(mode, feature, message, &deselect(2)))
+}
+
+/// Returns the node that moves the sensor away from the object in a mode, and its speed [m/s].
+fn away<'a>(mode: &'a ModeLaw<'_>) -> Option<(&'a str, f64)> {
+    let constants = || mode.law.constants.iter().map(|constant| (&*constant.node, constant.twist[2]));
+    let speed: f64 = constants().map(|(_, speed)| speed).sum();
+    let constant = constants().find(|_| speed < 0.0).map(|(node, _)| (node, -speed));
+    let parks = |guide: &&Guidance| guide.kind == "park" && guide.passes[2] && !mode.rests(guide);
+    // It is slower at the end of its way.
+    let park = || mode.law.guidance.iter().find(parks).map(|guide| (guide.node(), 0.0));
+    constant.or_else(park)
+}
+
+/// Returns the warning about a feature that moves the sensor along a component in which a node holds it at a place.
+fn held(mode: &ModeLaw<'_>) -> Option<Diagnostic> {
+    let (guide, feature, i) = mode.law.guidance.iter().find_map(|guide| {
+        let holds = holds(mode, guide)?;
+        let moves = |feature: &Feature| (0..6).find(|i| holds[*i] && guide.passes[*i] && feature.column[*i] != 0.0);
+        mode.moving().find_map(|feature| Some((guide, feature, moves(feature)?)))
+    })?;
+    let message = format!(
+        "{}`{}` and `{}` both move `{}`: one holds the sensor at a place, the other one moves it to its setpoint, and it \
+         rests between them",
+        mode.named(),
+        guide.node(),
+        feature.name,
+        COMPONENTS[i]
+    );
+    Some(report(mode, feature, message, &deselect(i)))
+}
+
+/// Returns the components in which a node holds the sensor at a place in a mode. One with a gate may hold it at other
+/// times.
+fn holds(mode: &ModeLaw<'_>, guide: &Guidance) -> Option<[bool; 6]> {
+    let node = mode.nodes.node(guide.node())?;
+    let moves = |key: &str| mode.nodes.number(node, key).is_some_and(|speed| speed > 0.0);
+    let (linear, angular) = (moves("speed_m_per_s"), moves("speed_rad_per_s"));
+    match guide.kind.as_str() {
+        "hold_pose" if source(node, "gate").is_none() => {
+            Some(std::array::from_fn(|i| if i < 3 { linear } else { angular }))
+        }
+        // The force holds the distance to the surface on which a path lies.
+        "follow_path" => Some([linear, linear, false, false, false, false]),
+        _ => None,
+    }
+}
+
+/// Returns the warning about a mode that moves on into the object that the modes before have pressed, where nothing that
+/// the pad feels ends it.
+fn push(arm: &Controlled<'_>, mode: &ModeLaw<'_>) -> Option<Diagnostic> {
+    let speed: f64 = mode.law.constants.iter().map(|constant| constant.twist[2]).sum();
+    let controls = |mode: &ModeLaw<'_>| mode.moving().any(|feature| feature.column[2] != 0.0);
+    let feels = mode.watches() || mode.lost().next().is_some();
+    let presses = |guide: &Guidance| guide.passes[2] && !GUIDES.contains(&&*guide.kind);
+    if speed <= 0.0 || controls(mode) || feels || mode.law.guidance.iter().any(presses) {
+        return None;
+    }
+    let before = |other: &&ModeLaw<'_>| controls(other) && other.exits("go").any(|exit| exit.to == mode.own_name());
+    let before = arm.modes.iter().find(before)?;
+    let constant = mode.law.constants.iter().find(|constant| constant.twist[2] > 0.0)?;
+    let message = format!(
+        "{}`{}` moves the sensor into the object with {speed} m/s: mode `{}` ends with a contact, and here no exit waits for \
+         what the pad feels",
+        mode.named(),
+        constant.node,
+        before.own_name()
+    );
+    let help = "move along -z to leave the object, or let an exit wait for a force or for `touch.present`";
+    Some(Diagnostic::new(Code::OpposedMotion, mode.place(&constant.node, "twist"), message).help(help))
+}
+
+fn deselect(i: usize) -> String {
+    format!("in this mode, select 0 for `{}` in the projector behind the column", COMPONENTS[i])
+}
+
+fn report(mode: &ModeLaw<'_>, feature: &Feature, message: String, help: &str) -> Diagnostic {
+    Diagnostic::new(Code::OpposedMotion, mode.place_of_column(feature), message).help(help)
+}

@@ -1,0 +1,187 @@
+//! Controllers as an integrator may write them.
+
+use super::variant::{Variant, cleared, compared, graph, search, variant};
+
+/// The lines of all gains of a task, with each `kp` and `ki` times a factor.
+fn scaled(task: &'static str, factor: f64) -> Vec<String> {
+    let text = std::fs::read_to_string(graph(task)).unwrap();
+    let scale = |line: &str| {
+        let mut words: Vec<String> = line.split('#').next().unwrap().split(' ').map(str::to_owned).collect();
+        for at in 0..words.len().saturating_sub(2) {
+            if ["kp", "ki"].contains(&words[at].as_str()) {
+                let (digits, end) = words[at + 2].split_at(words[at + 2].trim_end_matches(',').len());
+                words[at + 2] = format!("{}{end}", digits.parse::<f64>().unwrap() * factor);
+            }
+        }
+        words.join(" ")
+    };
+    text.lines().filter(|line| line.starts_with("gains.")).map(scale).collect()
+}
+
+/// Good controllers with loops through a delay, and with sides of a switch that other modes use.
+pub(super) fn good_behind_nodes() -> Vec<Variant> {
+    vec![
+        // The last value is held through a delay, which closes a loop.
+        variant(
+            "hybrid",
+            &[
+                "set nodes.held.type=\"switch\"",
+                "set nodes.held.in.on=\"touch.x\"",
+                "set nodes.held.in.off=\"old.value\"",
+                "set nodes.held.in.select=\"touch.present\"",
+                "set nodes.error.in.x=\"held.value\"",
+                "set nodes.old.type=\"delay\"",
+                "set nodes.old.unit=\"m\"",
+                "set nodes.old.in.value=\"held.value\"",
+            ],
+        ),
+        variant(
+            "hybrid",
+            &[
+                "set nodes.held.type=\"twist_switch\"",
+                "set nodes.held.in.on=\"projector.twist\"",
+                "set nodes.held.in.off=\"old.value\"",
+                "set nodes.held.in.select=\"touch.present\"",
+                "set nodes.sum.in.touch=\"held.value\"",
+                "set nodes.old.type=\"twist_delay\"",
+                "set nodes.old.in.value=\"held.value\"",
+            ],
+        ),
+        // A slow side of a switch that only another mode uses.
+        variant(
+            "hybrid",
+            &[
+                "set nodes.slow.type=\"low_pass\"",
+                "set nodes.slow.in.value=\"touch.x\"",
+                "set nodes.slow.time_constant_ms=800",
+                "set nodes.held.type=\"switch\"",
+                "set nodes.held.in.on=\"touch.x\"",
+                "set nodes.held.in.off=\"slow.value\"",
+                "set nodes.held.in.select=\"modes.servo\"",
+                "set nodes.error.in.x=\"held.value\"",
+            ],
+        ),
+    ]
+}
+
+/// Controllers as an integrator may write them.
+pub(super) fn good() -> Vec<Variant> {
+    let mut all = Vec::new();
+    for task in ["hybrid", "edge", "explore", "rolling", "cable", "force", "position", "seek_ridge", "square"] {
+        // Those of `hybrid` are already the largest that `tune` proposes.
+        for factor in [0.3, 0.6, 0.9, if task == "hybrid" { 1.0 } else { 1.2 }] {
+            all.push(Variant { task, bench: None, changes: scaled(task, factor) });
+        }
+    }
+    for bench in ["ball", "pen", "toy_box", "held_ball", "moved_ball"] {
+        for factor in [0.3, 1.0] {
+            all.push(Variant { task: "hybrid", bench: Some(bench), changes: scaled("hybrid", factor) });
+        }
+    }
+    for speed in ["0.005", "0.008"] {
+        all.push(Variant { task: "edge", bench: None, changes: search(speed) });
+    }
+    all.extend([
+        variant("hybrid", &["setpoint = { x = 0.01, y = -0.01, pressure = 0.3 }"]),
+        variant("hybrid", &["setpoint = { x = 0.0, y = 0.0, pressure = 0.05 }"]),
+        variant("edge", &["setpoint = { pressure = 0.2, orientation = 0.0 }"]),
+        variant("edge", &["setpoint = { pressure = 0.1, orientation = -0.7 }"]),
+        variant("force", &["setpoint = { pressure = 1.0 }"]),
+        // Other signs and scales of the same motion.
+        variant("hybrid", &["gains.x = { kp = 1.75 }", "columns.x = [-2, 0, 0, 0, 0, 0]"]),
+        variant("hybrid", &["columns.x = [-1, 0, 0, 0, 20, 0]"]),
+        variant("rolling", &["columns.x = [-1, 0, 0, 0, -5, 0]", "columns.y = [0, -1, 0, 5, 0, 0]"]),
+        // Features left out, with their columns.
+        variant(
+            "hybrid",
+            &[
+                "-in.y",
+                "-gains.y",
+                "-columns.y",
+                "-pid.gains.y.kp",
+                "setpoint = { x = 0.0, pressure = 0.1 }",
+                "select = [1, 0, 1, 0, 0, 0]",
+                "+",
+                "set parts.ruler.in.y=\"touch.y\"",
+            ],
+        ),
+        variant("cable", &["select = [1, 0, 1, 0, 1, 1]"]),
+        variant("edge", &["select = [1, 1, 1, 1, 1, 1]"]),
+        variant("rolling", &["select = [0, 0, 1, 1, 1, 0]"]),
+        variant("hybrid", &["gains.x = { kp = 3.5, kd = 0.005 }"]),
+        // A task that creeps first and then approaches.
+        Variant { task: "hybrid", bench: None, changes: cleared("0.002") },
+        // Modes that lead to each other with a gap, or after a while.
+        variant("position", &["set modes.servo.go.below=0.04"]),
+        variant("position", &["set modes.servo.go.below=0.08", "set modes.servo.go.for_ms=1000"]),
+        // Filters, derivatives and integrals as they should be.
+        variant("hybrid", &["time_constant_ms = 200"]),
+        variant("hybrid", &["time_constant_ms = 20"]),
+        variant("force", &["gains.pressure = { kp = 0.5, ki = 0.1, within = 0.02, kd = 0.01 }"]),
+        variant("force", &["gains.pressure = { kp = 0.5, ki = 0.1, bound = 0.01 }"]),
+        variant("edge", &["gains.orientation = { kp = 6.0, ki = 6.0, limit = 0.7 }"]),
+        variant("edge", &["gains.orientation = { kp = 8.0, ki = 8.0, within = 0.05, limit = 0.7 }"]),
+        variant("position", &["gains.x = { kp = 2.0, ki = 0.5, within = 0.002 }"]),
+        variant(
+            "force",
+            &[
+                "set nodes.pid.in.error=\"rest.error\"",
+                "set nodes.rest.type=\"deadband\"",
+                "set nodes.rest.in.error=\"error.error\"",
+                "set nodes.rest.width.pressure={ inner = 0.001, outer = 0.003 }",
+            ],
+        ),
+    ]);
+    all
+}
+
+/// Controllers that look like poor ones.
+pub(super) fn good_at_second_sight() -> Vec<Variant> {
+    vec![
+        // A second projector that no mode changes.
+        variant(
+            "hybrid",
+            &[
+                "set nodes.second.type=\"projector\"",
+                "set nodes.second.in.twist=\"projector.twist\"",
+                "set nodes.second.select=[1, 1, 1, 0, 0, 0]",
+                "set nodes.sum.in.touch=\"second.twist\"",
+            ],
+        ),
+        // A feature that rests in one mode.
+        variant("hybrid", &["set modes.approach.set.pid.gains.x.kp=0.0"]),
+        // A slight roll against the motion, for a pad that stays normal to a ball.
+        variant("hybrid", &["columns.x = [-1, 0, 0, 0, 2, 0]", "select = [1, 1, 1, 0, 1, 0]"]),
+        // The pressure is let go on purpose.
+        variant(
+            "force",
+            &[
+                "+[modes.let_go]",
+                "+set.error.setpoint.pressure = 0.0",
+                "+go = { to = \"approach\", when = \"touch.present\", is = \"false\", for_ms = 40 }",
+                "set modes.servo.go={ to = \"let_go\", after_ms = 5000 }",
+            ],
+        ),
+        // Back off after a loss, and approach again from there.
+        variant(
+            "hybrid",
+            &[
+                "on_lost = { of = \"touch.present\", after_ms = 100, to = \"back\" }",
+                "+[modes.back]",
+                "+set.projector.select = [0, 0, 0, 0, 0, 0]",
+                "+set.reach.twist = [0, 0, -0.01, 0, 0, 0]",
+                "+go = { to = \"again\", after_travel_mm = 10, of = \"move.sensor_pose\" }",
+                "+fail = { after_ms = 5000 }",
+                "+[modes.again]",
+                "+set.projector.select = [0, 0, 0, 0, 0, 0]",
+                "+set.reach.twist = [0, 0, 0.012, 0, 0, 0]",
+                "+go = { to = \"servo\", when = \"touch.present\", for_ms = 40 }",
+                "+fail = { after_ms = 10000 }",
+            ],
+        ),
+        // A retreat with the control off, and a guarded press.
+        variant("square", &["set modes.retreat.set.reach.twist=[0, 0, -0.03, 0, 0, 0]"]),
+        // A comparison with a hysteresis.
+        variant("force", &[&compared("set nodes.firm.above=2.0")[..], &["set nodes.firm.hysteresis=0.5"]].concat()),
+    ]
+}

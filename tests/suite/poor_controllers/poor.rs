@@ -1,0 +1,225 @@
+//! Controllers with one mistake, each with the code of its warning.
+
+use super::variant::{Variant, cleared, compared, gated, on, search, variant};
+
+/// Mistakes that nodes between the feature and the motion hide from a first look.
+pub(super) fn poor_behind_nodes() -> Vec<(&'static str, Variant)> {
+    let with = |mut changes: Vec<String>, more: &[&str]| {
+        changes.extend(more.iter().map(|change| (*change).to_owned()));
+        Variant { task: "hybrid", bench: None, changes }
+    };
+    let twist = || gated("twist_gate", "projector.twist", "sum.in.touch", "touch.present");
+    let feature = |gate: &str| gated("gate", "touch.x", "error.in.x", gate);
+    let other =
+        |gate: &str| with(feature(gate), &["set nodes.no.type=\"not\"", "set nodes.no.in.flag=\"touch.present\""]);
+    vec![
+        ("low-margin", with(twist(), &["gains.x = { kp = 17.5 }"])),
+        ("wrong-column", with(twist(), &["columns.x = [1, 0, 0, 0, 20, 0]"])),
+        ("low-margin", with(feature("touch.present"), &["gains.x = { kp = 17.5 }"])),
+        ("unfiltered-derivative", with(feature("touch.present"), &["gains.x = { kp = 3.5, kd = 0.1 }"])),
+        ("unused-column", other("no.is_met")),
+        // A delay smooths nothing.
+        (
+            "unfiltered-derivative",
+            with(
+                vec!["gains.x = { kp = 3.5, kd = 0.1 }".to_owned()],
+                &[
+                    "set nodes.late.type=\"delay\"",
+                    "set nodes.late.unit=\"m\"",
+                    "set nodes.late.in.value=\"touch.x\"",
+                    "set nodes.error.in.x=\"late.value\"",
+                ],
+            ),
+        ),
+        ("unused-column", with(feature("modes.approach"), &[])),
+    ]
+}
+
+/// Columns that move the sensor the wrong way, or along the wrong axis.
+pub(super) fn wrong_columns() -> Vec<(&'static str, Variant)> {
+    let cases = [
+        variant("hybrid", &["columns.x = [1, 0, 0, 0, 20, 0]"]),
+        variant("hybrid", &["columns.y = [0, 1, 0, -20, 0, 0]"]),
+        variant("hybrid", &["columns.pressure = [0, 0, -1, 0, 0, 0]"]),
+        variant(
+            "hybrid",
+            &[
+                "columns.y = [0, -1, 0, 0, 0, 0]",
+                "columns.pressure = [0, 0, 0, 1, 0, 0]",
+                "select = [1, 1, 0, 1, 0, 0]",
+            ],
+        ),
+        variant("hybrid", &["columns.x = [0, -1, 0, 20, 0, 0]", "columns.y = [-1, 0, 0, 0, -20, 0]"]),
+        variant("hybrid", &["columns.x = [0, -1, 0, 20, 0, 0]"]),
+        variant("edge", &["columns.orientation = [0, 0, 0, 0, 0, 1]"]),
+        variant("edge", &["columns.pressure = [0, 0, 0, 0, 0, -1]", "columns.orientation = [0, 0, 1, 0, 0, 0]"]),
+        variant("rolling", &["columns.x = [-1, 0, 0, 0, 20, 0]"]),
+        // As the paper prints it.
+        variant("rolling", &["columns.y = [0, -1, 0, -20, 0, 0]"]),
+        variant("force", &["columns.pressure = [0, 0, -1, 0, 0, 0]"]),
+        variant("cable", &["columns.orientation = [0, 0, 0, 0, 0, 1]"]),
+        variant("cable", &["columns.x = [0, 0, 0, 0, 0, -1]", "columns.orientation = [-1, 0, 0, 0, -20, 0]"]),
+        variant("explore", &["columns.x = [1, 0, 0, 0, -20, 0]"]),
+        variant("seek_ridge", &["columns.y = [0, 1, 0, 20, 0, 0]"]),
+        variant("position", &["columns.y = [0, 1, 0, 20, 0, 0]"]),
+        variant("square", &["columns.pressure = [0, 0, -1, 0, 0, 0]"]),
+        variant("finger_press", &["columns.pressure = [0, 0, -0.0005, 0, 0, 0]"]),
+        variant("two_arms", &["set parts.left.set.jacobian.columns.x=[1, 0, 0, 0, 20, 0]"]),
+        variant("carry", &["set parts.left.set.jacobian.columns.force=[0, 0, -0.004, 0, 0, 0]"]),
+    ];
+    cases.into_iter().map(|variant| ("wrong-column", variant)).collect()
+}
+
+/// Gains, filters and setpoints.
+pub(super) fn poor_gains() -> Vec<(&'static str, Variant)> {
+    let stiff = "gains.pressure = { kp = 2.5, ki = 0.5, within = 0.02 }";
+    let slow = "time_constant_ms = 1000";
+    vec![
+        ("low-margin", variant("hybrid", &["gains.x = { kp = 17.5 }"])),
+        ("low-margin", variant("hybrid", &["gains.pressure = { kp = 5.0, ki = 1.0, within = 0.02 }"])),
+        ("low-margin", variant("hybrid", &["gains.pressure = { kp = 0.1, ki = 0.5, within = 0.02 }"])),
+        ("low-margin", variant("position", &["gains.x = { kp = 17.5 }"])),
+        ("low-margin", variant("edge", &[stiff])),
+        ("low-margin", variant("edge", &["gains.orientation = { kp = 30.0, ki = 30.0, within = 0.05, limit = 0.7 }"])),
+        ("low-margin", on("pen", variant("force", &[stiff]))),
+        ("low-margin", on("pen", variant("hybrid", &[stiff]))),
+        ("low-margin", on("toy_box", variant("force", &[stiff]))),
+        ("slow-filter", variant("hybrid", &[slow])),
+        ("slow-filter", variant("edge", &[slow])),
+        ("slow-filter", on("pen", variant("force", &[slow]))),
+        ("slow-filter", variant("edge", &["set parts.touch.set.orientation.window=250"])),
+        ("slow-filter", variant("cable", &["set nodes.direction.window=250"])),
+        ("unfiltered-derivative", variant("hybrid", &["gains.x = { kp = 3.5, kd = 0.1 }"])),
+        ("unfiltered-derivative", variant("position", &["gains.y = { kp = 3.5, kd = 0.05 }"])),
+        ("unfiltered-derivative", variant("explore", &["gains.y = { kp = 2.0, kd = 0.02 }"])),
+        ("windup", variant("hybrid", &["gains.pressure = { kp = 0.5, ki = 0.1 }"])),
+        ("windup", on("pen", variant("force", &["gains.pressure = { kp = 0.5, ki = 0.1 }"]))),
+        ("windup", variant("edge", &["gains.orientation = { kp = 6.0, ki = 6.0 }"])),
+        ("windup", variant("hybrid", &["gains.x = { kp = 3.5, ki = 1.0, limit = 0.2 }"])),
+        ("windup", variant("hybrid", &["gains.pressure = { kp = 0.5, ki = 0.1, within = 5.0 }"])),
+        ("unstable-gain", variant("hybrid", &["gains.x = { kp = 600.0 }"])),
+        // By the sampling alone: 1.2 times the error in each period.
+        ("low-margin", on("held_ball", variant("hybrid", &["gains.x = { kp = 300.0 }"]))),
+        ("unusual-gain", variant("hybrid", &["gains.x = { kp = -3.5 }", "columns.x = [1, 0, 0, 0, 20, 0]"])),
+        ("unreachable-setpoint", variant("force", &["setpoint = { pressure = 4.0 }"])),
+        ("unreachable-setpoint", variant("force", &["setpoint = { pressure = 0.005 }"])),
+        ("unreachable-setpoint", variant("carry", &["set parts.right.set.error.setpoint.force=7.0"])),
+        ("unusual-value", variant("position", &["setpoint = { x = 0.2, y = 0.0 }"])),
+        // Contacts that cannot be read check nothing.
+        (
+            "unusual-value",
+            variant(
+                "hybrid",
+                &["set facts.arm.contacts=[{ object = \"ball\", pressure = { vz = 10.0, resonance = 5.0 } }]"],
+            ),
+        ),
+    ]
+}
+
+/// Projectors and modes.
+pub(super) fn poor_modes() -> Vec<(&'static str, Variant)> {
+    let searching = |task: &'static str| Variant { task, bench: None, changes: search("0.03") };
+    let after_a_clearance =
+        Variant { task: "hybrid", bench: None, changes: [search("0.03"), cleared("-0.01")].concat() };
+    vec![
+        ("unused-column", variant("hybrid", &["select = [1, 1, 0, 0, 0, 0]"])),
+        ("unused-column", variant("edge", &["select = [0, 0, 1, 0, 0, 0]"])),
+        ("unused-column", variant("hybrid", &["columns.y = [0, 0, 0, 0, 0, 0]", "select = [1, 0, 1, 0, 0, 0]"])),
+        ("idle-axis", variant("force", &["select = [1, 0, 1, 0, 0, 0]"])),
+        ("idle-axis", variant("hybrid", &["select = [1, 1, 1, 0, 0, 1]"])),
+        ("unforced-rolling", variant("rolling", &["select = [1, 1, 0, 1, 1, 0]"])),
+        ("unforced-rolling", variant("position", &["select = [1, 1, 0, 1, 1, 0]"])),
+        ("unforced-rolling", variant("explore", &["select = [1, 1, 0, 1, 1, 1]"])),
+        ("line-position", variant("cable", &["select = [1, 1, 1, 0, 0, 1]"])),
+        ("line-position", on("bent_cable", variant("cable", &["select = [1, 1, 1, 1, 0, 1]"]))),
+        ("chattering-modes", variant("position", &["set modes.servo.go.below=0.06"])),
+        ("chattering-modes", variant("position", &["set modes.servo.go.below=0.05", "set modes.servo.go.for_ms=100"])),
+        (
+            "chattering-modes",
+            variant("position", &["set modes.press.go.above=0.03", "set modes.press.go.hysteresis=0.01"]),
+        ),
+        ("fast-recovery", searching("hybrid")),
+        ("fast-recovery", searching("edge")),
+        ("fast-recovery", after_a_clearance),
+        ("unused-column", variant("hybrid", &["columns.y = [0.8, -1, 0, 20, 0, 0]", "select = [1, 0, 1, 0, 0, 0]"])),
+    ]
+}
+
+/// Mistakes that two nodes make together, or that only the bench or another node shows.
+pub(super) fn poor_sums() -> Vec<(&'static str, Variant)> {
+    let gated_above = |above: &str| {
+        let mut changes = gated("gate", "touch.x", "error.in.x", "firm.is_met");
+        changes.extend(
+            ["set nodes.firm.type=\"compare\"", "set nodes.firm.in.value=\"touch.pressure\""].map(str::to_owned),
+        );
+        changes.push(format!("set nodes.firm.above={above}"));
+        Variant { task: "hybrid", bench: None, changes }
+    };
+    vec![
+        // The same motion is added twice.
+        ("low-margin", variant("hybrid", &["gains.y = { kp = 1.0 }", "set nodes.sum.in.twice=\"projector.twist\""])),
+        (
+            "low-margin",
+            variant(
+                "edge",
+                &["set nodes.sum.in.twice=\"projector.twist\"", "set nodes.sum.in.thrice=\"projector.twist\""],
+            ),
+        ),
+        // The bench says the opposite of geometry.
+        ("wrong-column", variant("hybrid", &["set facts.arm.contacts=[{ object = \"ball\", x = { vx = 1.0 } }]"])),
+        (
+            "wrong-column",
+            variant("force", &["set facts.arm.contacts=[{ object = \"ball\", pressure = { vz = -3.5 } }]"]),
+        ),
+        (
+            "unusual-value",
+            variant("hybrid", &["set facts.arm.contacts=[{ object = \"ball\", presure = { vz = 3.5 } }]"]),
+        ),
+        ("windup", variant("hybrid", &["gains.pressure = { kp = 0.4, ki = 0.08, within = 0.2 }"])),
+        ("unusual-gain", variant("hybrid", &["gains.x = { kp = 0.0 }"])),
+        ("chattering-modes", variant("force", &compared("set nodes.firm.above=2.0"))),
+        (
+            "chattering-modes",
+            variant(
+                "position",
+                &["set modes.servo.go.when=\"touch.moments.pressure\"", "set modes.servo.go.below=0.06"],
+            ),
+        ),
+        ("unused-column", gated_above("4.0")),
+        ("unused-column", gated_above("0.25")),
+    ]
+}
+
+/// Motions against each other, and against the object.
+pub(super) fn opposed() -> Vec<(&'static str, Variant)> {
+    vec![
+        ("opposed-motion", variant("explore", &["set modes.park.set.projector.select=[1, 1, 1, 1, 1, 1]"])),
+        (
+            "opposed-motion",
+            variant(
+                "hybrid",
+                &[
+                    "set nodes.hold.type=\"hold_pose\"",
+                    "set nodes.hold.in.pose=\"move.sensor_pose\"",
+                    "set nodes.hold.speed_m_per_s=0.02",
+                    "set nodes.sum.in.hold=\"hold.twist\"",
+                ],
+            ),
+        ),
+        ("opposed-motion", variant("square", &["set modes.retreat.set.reach.twist=[0, 0, 0.015, 0, 0, 0]"])),
+        // The motion of the approach passes a projector that selects nothing then.
+        (
+            "no-approach",
+            variant(
+                "hybrid",
+                &[
+                    "set nodes.last.type=\"projector\"",
+                    "set nodes.last.in.twist=\"sum.twist\"",
+                    "set nodes.last.select=[1, 1, 1, 0, 0, 0]",
+                    "set modes.approach.set.last.select=[0, 0, 0, 0, 0, 0]",
+                    "set parts.move.in.twist=\"last.twist\"",
+                ],
+            ),
+        ),
+    ]
+}

@@ -1,0 +1,119 @@
+//! A shipped task with changes.
+
+use std::path::PathBuf;
+
+use tactflow_runtime::graph::{Compiled, Request, compile};
+use tactflow_runtime::source::Report;
+use tactflow_tests::{catalogue, workspace};
+
+/// A shipped task with changes: lines that replace the first one with the same key, `+` lines that are appended, `-` keys
+/// whose lines are removed, and `set` assignments.
+pub(super) struct Variant {
+    pub(super) task: &'static str,
+    pub(super) bench: Option<&'static str>,
+    pub(super) changes: Vec<String>,
+}
+
+pub(super) fn variant(task: &'static str, changes: &[&str]) -> Variant {
+    Variant { task, bench: None, changes: changes.iter().map(|change| (*change).to_owned()).collect() }
+}
+
+pub(super) fn on(bench: &'static str, variant: Variant) -> Variant {
+    Variant { bench: Some(bench), ..variant }
+}
+
+pub(super) fn graph(task: &str) -> PathBuf {
+    workspace().join("graphs").join(task).with_extension("toml")
+}
+
+fn key(line: &str) -> &str {
+    line.split('=').next().unwrap().trim()
+}
+
+impl Variant {
+    pub(super) fn text(&self) -> String {
+        let text = std::fs::read_to_string(graph(self.task)).unwrap();
+        let mut lines: Vec<String> = text.lines().map(str::to_owned).collect();
+        for change in self.changes.iter().filter(|change| !change.starts_with("set ")) {
+            match change.split_at(1) {
+                ("+", more) => lines.push(more.to_owned()),
+                ("-", gone) => lines.retain(|line| key(line) != gone),
+                _ => {
+                    let at = lines.iter().position(|line| key(line) == key(change));
+                    lines[at.unwrap_or_else(|| panic!("{} has no `{change}`", self.task))].clone_from(change);
+                }
+            }
+        }
+        lines.join("\n") + "\n"
+    }
+
+    fn request(&self, text: String) -> Request {
+        let sets = self.changes.iter().filter_map(|change| change.strip_prefix("set "));
+        let request = Request { text: Some(text), ..Request::file(graph(self.task)) };
+        let request = sets.fold(request, |request, set| request.set(set));
+        match self.bench {
+            Some(bench) => request.bench(workspace().join("graphs/benches").join(bench).with_extension("toml")),
+            None => request,
+        }
+    }
+
+    pub(super) fn compiled(&self, text: String) -> Compiled {
+        let named = || format!("{}, {:?}", self.task, self.changes);
+        compile(&catalogue(), &self.request(text))
+            .unwrap_or_else(|report| panic!("{}\n{}", named(), report.render(false)))
+    }
+
+    pub(super) fn warnings(&self) -> Option<Report> {
+        self.compiled(self.text()).warnings()
+    }
+}
+
+/// A mode that searches with a speed, for a task with the modes `approach` and `servo`.
+pub(super) fn search(speed: &str) -> Vec<String> {
+    [
+        "on_lost = { of = \"touch.present\", after_ms = 100, to = \"search\" }".to_owned(),
+        "+[modes.search]".to_owned(),
+        "+set.projector.select = [0, 0, 0, 0, 0, 0]".to_owned(),
+        format!("+set.reach.twist = [0, 0, {speed}, 0, 0, 0]"),
+        "+go = { to = \"servo\", when = \"touch.present\", for_ms = 40 }".to_owned(),
+        "+fail = { after_ms = 10000, after_travel_mm = 60, of = \"move.sensor_pose\" }".to_owned(),
+    ]
+    .into()
+}
+
+/// A first mode that lifts the sensor off with a speed, before the task approaches.
+pub(super) fn cleared(speed: &str) -> Vec<String> {
+    [
+        "start = \"clear\"".to_owned(),
+        "+[modes.clear]".to_owned(),
+        "+set.projector.select = [0, 0, 0, 0, 0, 0]".to_owned(),
+        format!("+set.reach.twist = [0, 0, {speed}, 0, 0, 0]"),
+        "+go = { to = \"approach\", after_travel_mm = 5, of = \"move.sensor_pose\" }".to_owned(),
+        "+fail = { after_ms = 5000 }".to_owned(),
+    ]
+    .into()
+}
+
+/// A gate in front of a port that a task reads at an input.
+pub(super) fn gated(kind: &str, port: &str, input: &str, gate: &str) -> Vec<String> {
+    [
+        format!("set nodes.only.type={kind:?}"),
+        format!("set nodes.only.in.value={port:?}"),
+        format!("set nodes.only.in.gate={gate:?}"),
+        format!("set nodes.{input}=\"only.value\""),
+    ]
+    .into()
+}
+
+/// Modes of `force` that follow the flag of a comparison: `eased` presses with half the pressure while the force is large.
+pub(super) fn compared(bound: &str) -> [&str; 7] {
+    [
+        "set nodes.firm.type=\"compare\"",
+        "set nodes.firm.in.value=\"touch.force\"",
+        bound,
+        "set modes.servo.go={ to = \"eased\", when = \"firm.is_met\", for_ms = 20 }",
+        "set modes.eased.set.error.setpoint.pressure=0.05",
+        "set modes.eased.go={ to = \"servo\", when = \"firm.is_met\", is = \"false\", for_ms = 20 }",
+        "set modes.eased.on_lost={ of = \"touch.present\", after_ms = 100, to = \"approach\" }",
+    ]
+}
