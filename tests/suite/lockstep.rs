@@ -100,6 +100,32 @@ fn every_servo_task_runs_on_it_with_no_other_change() {
 }
 
 #[test]
+fn an_arm_with_the_stiffness_of_its_robot_file_presses_faster_than_a_stiff_one() {
+    let explained = |more: &[&str]| {
+        let peer = Peer::start("--scene pen --seconds 1");
+        let address = format!("devices.bench.address=127.0.0.1:{}", peer.port);
+        let bench = ["explain", "graphs/force.toml", "--bench", "graphs/benches/lockstep.toml", "--set", &address];
+        said(&mut tool(&[&bench[..], more].concat()))
+    };
+    let soft = explained(&[]);
+    assert!(soft.out.contains("joint_n_m_per_rad = 200.0"), "{}{}", soft.out, soft.err);
+    let joints = explained(&["--set", "devices.bench.stiffness=[200, 200, 150, 100, 300, 50, 50]"]);
+    assert!(joints.out.contains("joint_n_m_per_rad = 300.0"), "{}{}", joints.out, joints.err);
+    let few = explained(&["--set", "devices.bench.stiffness=[200, 200]"]);
+    assert!(few.err.contains("the list has 2 entries, but the arm has 7 joints"), "{}", few.err);
+    // A pad with a large area, 30 mm/s into the object: the limit of the force slows a stiff arm down.
+    let slowed = |more: &[&str]| {
+        let (said, _) = run("force", "--scene plane --seconds 2.5", more);
+        assert_eq!(said.code, 0, "{}", said.err);
+        let row = said.out.lines().find(|line| line.starts_with("move.contact.force")).map(str::to_owned);
+        let time = row.map(|row| row.split_whitespace().nth(1).unwrap().parse::<f64>().unwrap());
+        time.unwrap_or_default()
+    };
+    let (soft, stiff) = (slowed(&[]), slowed(&["--set", "facts.arm.joint_n_m_per_rad=1e6"]));
+    assert!(stiff > 0.2 && soft < 0.3 * stiff, "limited for {soft} s, and for {stiff} s");
+}
+
+#[test]
 fn a_ball_is_found_centred_and_measured() {
     let (said, seen) = run("hybrid", "--scene ball --offset 0.01 -0.005 --seconds 5", &[]);
     assert_eq!(said.code, 0, "{}", said.err);

@@ -16,6 +16,7 @@ pub mod mock_force;
 pub mod mock_guide;
 pub mod mock_pad;
 pub(crate) mod pad;
+pub(crate) mod per_joint;
 #[cfg(feature = "process")]
 pub mod process;
 pub mod recording;

@@ -16,6 +16,7 @@ use tactflow_runtime::signal::{Image, ImageShape, Joint, JointsShape, Unit};
 use tactflow_runtime::source::{Code, quoted};
 
 use super::arm::{self, ArmPorts};
+use super::per_joint::PerJoint;
 use super::{Facts, pad};
 use crate::arm::model::load;
 use crate::builtin;
@@ -45,6 +46,10 @@ pub struct Params {
     /// Maximum acceleration of each joint; it is not part of the protocol.
     #[param(unit = "rad/s2", above = 0.0, default = 10.0)]
     acceleration: f64,
+    /// Stiffness of the joints of a compliant arm, stated as a fact. The simulated arm must not be stiffer. Without it,
+    /// the arm counts as stiff, and `contact_limit` lets it press slowly.
+    #[param(unit = "N m/rad", above = 0.0)]
+    stiffness: Option<PerJoint>,
     /// Number of frames of the self-test at the start, stated as a fact; 0 for none.
     #[param(default = pad::REST_FRAMES)]
     rest_frames: usize,
@@ -73,7 +78,7 @@ pub struct Params {
 /// are faults that name the message and the field. If the simulator still listens, the device brings the arm to rest
 /// before it disconnects.
 ///
-/// It states the facts `urdf`, `tip` and, if it is given, `home` of the arm, and `dead`, `threshold`, `pressure`,
+/// It states the facts `urdf`, `tip` and, if they are given, `home` and `joint_n_m_per_rad` of the arm, and `dead`, `threshold`, `pressure`,
 /// `calibration`, `mount`, `rest_frames` and `tare_bound` of the pad. The `contact` that a task reports is sent as `est`.
 ///
 /// ```toml
@@ -193,7 +198,12 @@ fn model_facts(hello: &Hello, params: &Params) -> Result<Facts, Mistakes> {
             format!("its `joints` are {:?}, but those of the model up to `{}` are {model:?}", hello.joints, hello.tip);
         return Err(refusal(&params.address, why));
     }
-    arm::facts(&urdf, &hello.tip, params.home.as_deref())
+    let mut facts = arm::facts(&urdf, &hello.tip, params.home.as_deref())?;
+    let stiffness = params.stiffness.as_ref().map(|stiffness| stiffness.joints(hello.joints.len())).transpose();
+    let stiffness = stiffness.map_err(|message| Mistake::param("stiffness", message))?;
+    let stiffest = stiffness.map(|joints| joints.into_iter().fold(0.0, f64::max));
+    facts.extend(stiffest.map(|stiffest| ("joint_n_m_per_rad".into(), stiffest.into())));
+    Ok(facts)
 }
 
 /// Returns the name of a model without folders and extension.

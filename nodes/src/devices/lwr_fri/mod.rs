@@ -7,7 +7,6 @@
 mod driver;
 mod intake;
 mod listen;
-mod per_joint;
 mod permit;
 mod target;
 mod wire;
@@ -19,6 +18,7 @@ use tactflow_runtime::node::{Describe, FilePath, Map, Mistake, Mistakes, Param, 
 
 use super::arm::{self, ArmPorts};
 use super::pad;
+use super::per_joint::PerJoint;
 use super::start::{StartBounds, StartCheck};
 use super::wrench::{ToolWeight, WrenchPorts};
 use crate::arm::chain::Chain;
@@ -26,7 +26,6 @@ use crate::arm::model::load;
 use crate::arm::mount::Mount;
 use driver::{Fri, Settings};
 pub(crate) use listen::listen;
-use per_joint::PerJoint;
 use target::{Bounds, Target};
 use wire::{Impedance, JOINTS, KRL_INT_COUNT};
 
@@ -208,7 +207,11 @@ fn check_chain(chain: &Chain, params: &Params) -> Result<(), Mistakes> {
 
 /// Returns the values of the joints, `None` without any.
 fn per_joint(param: &str, values: Option<&PerJoint>) -> Result<Option<[f64; JOINTS]>, Mistakes> {
-    values.map(|values| values.joints().map_err(|message| Mistake::param(param, message).into())).transpose()
+    let joints = |values: &PerJoint| {
+        let joints = values.joints(JOINTS).map_err(|message| Mistake::param(param, message))?;
+        Ok(std::array::from_fn(|i| joints[i]))
+    };
+    values.map(joints).transpose()
 }
 
 /// Returns the integers for the KRL program, each with its place, the first of which is 0.

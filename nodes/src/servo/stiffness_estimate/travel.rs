@@ -15,14 +15,14 @@ pub(super) struct Travel {
     equilibrium: Vec<f64>,
     /// Whether that equilibrium is known.
     is_known: bool,
-    /// The way that is not yet passed on [m].
-    behind: f64,
+    /// The way that is not yet passed on [m]; `None` before the first step.
+    behind: Option<f64>,
 }
 
 impl Travel {
     /// Nothing is known yet of an arm with so many joints.
     pub(super) fn new(joints: usize) -> Self {
-        Self { position: None, equilibrium: vec![0.0; joints], is_known: false, behind: 0.0 }
+        Self { position: None, equilibrium: vec![0.0; joints], is_known: false, behind: None }
     }
 
     /// Returns the measured step since the last sample [m]; `None` for the first one.
@@ -46,16 +46,18 @@ impl Travel {
     }
 
     /// Returns the step of a travel that follows the true one as a low-pass filter with the time constant `lag` [s].
+    ///
+    /// The sensor meets an object while it moves: before the first step, it has moved as in this step.
     pub(super) fn lagging(&mut self, step: f64, dt: f64, lag: f64) -> f64 {
-        self.behind += step;
         let share = if lag > 0.0 { -libm::expm1(-dt / lag) } else { 1.0 };
-        let passed = share * self.behind;
-        self.behind -= passed;
+        let behind = step + self.behind.unwrap_or(step * (1.0 - share) / share);
+        let passed = share * behind;
+        self.behind = Some(behind - passed);
         passed
     }
 
     /// Discards the way that is not yet passed on.
-    pub(super) fn drop_lag(&mut self) {
-        self.behind = 0.0;
+    pub(super) const fn drop_lag(&mut self) {
+        self.behind = None;
     }
 }

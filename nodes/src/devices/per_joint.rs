@@ -3,11 +3,9 @@
 use tactflow_runtime::node::{Bounds, Contents, Param, Reader, Written};
 use tactflow_runtime::source::{Item, Value};
 
-use super::wire::JOINTS;
-
 /// One number for all joints, or one for each from the base to the tip.
 #[derive(Debug, Clone, PartialEq)]
-pub(super) enum PerJoint {
+pub(crate) enum PerJoint {
     All(f64),
     Each(Vec<f64>),
 }
@@ -40,12 +38,12 @@ impl PerJoint {
     ///
     /// # Errors
     /// A message, if the list has another length.
-    pub(super) fn joints(&self) -> Result<[f64; JOINTS], String> {
+    pub(crate) fn joints(&self, count: usize) -> Result<Vec<f64>, String> {
         match self {
-            Self::All(number) => Ok([*number; JOINTS]),
+            Self::All(number) => Ok(vec![*number; count]),
+            Self::Each(numbers) if numbers.len() == count => Ok(numbers.clone()),
             Self::Each(numbers) => {
-                let other = |_| format!("the list has {} entries, but the arm has {JOINTS} joints", numbers.len());
-                numbers.as_slice().try_into().map_err(other)
+                Err(format!("the list has {} entries, but the arm has {count} joints", numbers.len()))
             }
         }
     }
