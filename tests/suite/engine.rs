@@ -76,7 +76,7 @@ const EVENTS: [Event; 11] = [
     Event {
         task: "hybrid",
         scene: "--scene box --stiffness 1000 --move 6 0.014 -0.014 0 --change 6 6.04",
-        holds: &[("/lost", 0.0), ("/after/response/x", 1.4), ("/after/response/y", 0.9)],
+        holds: &[("/lost", 0.0), ("/after/response/x", 1.2), ("/after/response/y", 1.4)],
     },
     // It turns by 6 degrees per second.
     Event {

@@ -12,6 +12,9 @@ use tactflow_runtime::source::Code;
 use line::Line;
 use travel::Travel;
 
+/// How much farther than commanded an arm may have moved; farther, it swings [1].
+const FARTHER: f64 = 1.2;
+
 /// Estimates how stiff a contact is: the change of a feature per metre of travel along the sensor's z.
 ///
 /// A gain is best for one stiffness: the same motion changes the pressure of a stiff object more than that of a soft
@@ -36,8 +39,10 @@ use travel::Travel;
 /// commanded travel the delay of the arm, which is 2 ζ / ω for a resonance. With too much lag, the object looks too stiff
 /// at first, which is safe.
 ///
-/// The object must rest while the sensor moves: an object that moves by itself changes the feature without any travel, and
-/// the last estimate stays until the sensor has moved again.
+/// **An object that moves.** The object must rest while the sensor moves. One that moves by itself changes the feature
+/// without any travel, and an arm that swings after a bounce moves farther than commanded. So with the commanded travel,
+/// an estimate is valid only if the arm has moved in the same direction, and at most a fifth farther. Where a stiff arm
+/// hides the motion of an object, the last estimate stays until the sensor has moved again.
 ///
 /// A small `multisine` along z excites a contact that rests. Friction hides small motions: choose `min_travel_m` well
 /// above the travel in which foam and joints stick.
@@ -111,10 +116,22 @@ pub struct Outputs {
 pub struct State {
     line: Line,
     travel: Travel,
+    /// The feature over the measured travel, where the commanded one counts.
+    measured_line: Line,
+    measured_travel: Travel,
     /// Since the last sample.
     interval: Interval,
     /// The last valid ratio.
     ratio: Option<f64>,
+}
+
+impl State {
+    /// Begins afresh.
+    fn begin(&mut self, line: Line) {
+        (self.line, self.measured_line) = (line, line);
+        self.travel.drop_lag();
+        self.measured_travel.drop_lag();
+    }
 }
 
 impl Node for StiffnessEstimate {
@@ -136,11 +153,19 @@ impl Node for StiffnessEstimate {
     }
 
     fn state(&self) -> State {
-        State { line: Line::default(), travel: Travel::new(self.joints), interval: Interval::default(), ratio: None }
+        State {
+            line: Line::default(),
+            travel: Travel::new(self.joints),
+            measured_line: Line::default(),
+            measured_travel: Travel::new(0),
+            interval: Interval::default(),
+            ratio: None,
+        }
     }
 
     fn step(&self, tick: &Tick, inputs: Inputs<'_>, out: &mut Outputs, state: &mut State) {
         let value = *inputs.value;
+        let measured = state.measured_travel.measured(&inputs.pose);
         let moved = match inputs.jacobian.zip(inputs.equilibrium) {
             Some((jacobian, equilibrium)) => state.travel.commanded(&inputs.pose, &jacobian, &equilibrium),
             // Wired, and absent at this moment: what was commanded is not known.
@@ -148,23 +173,25 @@ impl Node for StiffnessEstimate {
                 state.travel.forget();
                 None
             }
-            None => state.travel.measured(&inputs.pose),
+            None => measured,
         };
-        match moved.zip(state.interval.step(&inputs.value, tick)) {
-            Some((moved, dt)) => {
-                let travel = state.travel.lagging(moved, dt, self.params.lag_ms * 1e-3);
-                state.line.add(travel, value, libm::exp(-dt / self.params.memory_s));
+        match moved.zip(measured).zip(state.interval.step(&inputs.value, tick)) {
+            Some(((moved, measured), dt)) => {
+                let decay = libm::exp(-dt / self.params.memory_s);
+                let lag = self.params.lag_ms * 1e-3;
+                state.line.add(state.travel.lagging(moved, dt, lag), value, decay);
+                state.measured_line.add(state.measured_travel.lagging(measured, dt, lag), value, decay);
             }
-            None => {
-                state.travel.drop_lag();
-                state.line = Line::default().with(value);
-            }
+            None => state.begin(Line::default().with(value)),
         }
-        if !state.line.is_finite() {
-            state.travel.drop_lag();
-            state.line = Line::default();
+        if !(state.line.is_finite() && state.measured_line.is_finite()) {
+            state.begin(Line::default());
         }
         let slope = state.line.slope(self.params.min_travel_m, self.params.min_correlation);
+        // An arm that gives way moves less far than commanded, so the feature grows more with the measured travel.
+        let follows =
+            |slope: &f64| state.measured_line.slope(0.0, 0.0).is_some_and(|measured| *slope < FARTHER * measured);
+        let slope = slope.filter(|slope| self.joints == 0 || follows(slope));
         let ratio = slope.map(|slope| slope / self.params.nominal).filter(|ratio| ratio.is_finite());
         state.ratio = ratio.or(state.ratio);
         out.valid.set(ratio.is_some());

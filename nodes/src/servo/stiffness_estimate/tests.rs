@@ -146,8 +146,13 @@ fn commanding(params: &str) -> NodeRig {
     NodeRig::new::<StiffnessEstimate>(params, &wires).unwrap()
 }
 
-/// Shows a value while the equilibrium is `z` along the normal, of a sensor that does not move.
+/// Shows a value while the equilibrium is `z` along the normal, of an arm that gives way by half of it.
 fn command(rig: &mut NodeRig, z: f64, value: f64) -> (Option<f64>, bool) {
+    follow(rig, z, 0.5 * z, value)
+}
+
+/// Shows a value while the equilibrium is `z` along the normal, and the sensor has moved by `measured`.
+fn follow(rig: &mut NodeRig, z: f64, measured: f64, value: f64) -> (Option<f64>, bool) {
     let at = pose(0.0);
     let columns = [Vector3::z(), Vector3::x()].map(|axis| {
         let linear = at.0.rotation * axis;
@@ -155,7 +160,37 @@ fn command(rig: &mut NodeRig, z: f64, value: f64) -> (Option<f64>, bool) {
     });
     rig.set("jacobian", Jacobian(columns.into()));
     rig.set("equilibrium", Joints([0.3 + z, 0.7 - 5.0 * z].into()));
-    show(rig, 0.0, value)
+    show(rig, measured, value)
+}
+
+#[test]
+fn an_arm_that_is_pushed_or_swings_teaches_nothing() {
+    // The part of the commanded travel that the sensor moves.
+    for (part, is_valid) in
+        [(0.2, true), (1.0, true), (1.15, true), (1.3, false), (8.0, false), (0.0, false), (-0.5, false)]
+    {
+        let mut rig = commanding(&format!("{NOMINAL}\nlag_ms = 40"));
+        let mut value = 0.0;
+        let mut last = 0.0;
+        let found = (0..300).map(|i| {
+            // As the travel, the value is late.
+            value += -libm::expm1(-4.0 / 40.0) * (20.0 * sine(i) - value);
+            last = part * sine(i);
+            follow(&mut rig, sine(i), last, value)
+        });
+        let found = found.last().unwrap();
+        assert_eq!(found.1, is_valid, "{part} of the travel: {found:?}");
+        assert_eq!(found.0.is_some(), is_valid, "{part} of the travel: {found:?}");
+    }
+}
+
+#[test]
+fn an_object_is_met_by_a_sensor_that_already_moves() {
+    // A ramp, and a feature that follows it as a low-pass does, which has run for long before the contact.
+    let mut rig = commanding(&format!("{NOMINAL}\nlag_ms = 70"));
+    let ramp = |i: u32| 0.008 * 0.004 * f64::from(i);
+    let found = (0..40).map(|i| command(&mut rig, ramp(i), 10.0 * ramp(i))).last().unwrap();
+    assert!((found.0.unwrap() - 1.0).abs() < 1e-3, "{found:?}");
 }
 
 #[test]
@@ -181,7 +216,8 @@ fn a_feature_that_lags_has_its_whole_slope() {
         }
         found
     };
-    assert!((slope(80.0).unwrap() - 1.0).abs() < 1e-3, "{:?}", slope(80.0));
+    // The sine begins suddenly, but the travel as if the sensor had moved before.
+    assert!((slope(80.0).unwrap() - 1.0).abs() < 2e-3, "{:?}", slope(80.0));
     // Of a low-pass at 2 Hz, the part in phase is 1 / (1 + (w T)²).
     let in_phase = 1.0 / (1.0 + (2.0 * std::f64::consts::TAU * 0.08_f64).powi(2));
     assert!((slope(0.0).unwrap() - in_phase).abs() < 0.03, "without the lag it looks soft: {:?}", slope(0.0));

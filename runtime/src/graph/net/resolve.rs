@@ -219,7 +219,8 @@ impl Net<'_> {
 
     /// Returns a port of the scope with the name and the kind of an input, as a suggestion for its wire.
     pub(crate) fn find_candidate(&self, scope: usize, node: usize, input: &PortSpec) -> Option<&str> {
-        self.scope_ports(scope).candidate(node, input)
+        // A port that follows from the node would close a loop.
+        self.scope_ports(scope).candidate(input, |producer| !self.upstream(producer.node())[node])
     }
 
     /// Returns the exports of the parts in the graph and in its tasks, and what the tasks call the roles: each with the

@@ -39,9 +39,9 @@ impl ScopePorts {
         self.names.iter().find(|(port, _)| fits(**port)).map(|(_, name)| name.as_str())
     }
 
-    /// Returns the name of a port that has the name and the kind of an input, and that is not an output of `node`.
-    pub(super) fn candidate(&self, node: usize, input: &PortSpec) -> Option<&str> {
+    /// Returns the name of a port that has the name and the kind of an input, and whose producer fits.
+    pub(super) fn candidate(&self, input: &PortSpec, fits: impl Fn(Producer) -> bool) -> Option<&str> {
         let alike = self.alike.get(&(input.name.to_string(), input.kind))?;
-        alike.iter().find(|(producer, _)| *producer != Producer::Node(node)).map(|(_, name)| name.as_str())
+        alike.iter().find(|(producer, _)| fits(*producer)).map(|(_, name)| name.as_str())
     }
 }
