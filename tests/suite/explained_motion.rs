@@ -184,7 +184,7 @@ fn the_estimate_of_a_run_is_near_what_the_bench_states() {
         let stated = stated["facts"]["arm"]["contacts"][0]["pressure"]["vz"].as_float().unwrap();
         let rows = recorded(&["graphs/force.toml", "--bench", &file], "6s");
         let estimate = 10.0 * rows[rows.len() - 1]["stiffness.ratio"];
-        assert!((estimate / stated - 1.0).abs() < 0.2, "{bench}: {estimate}, stated {stated} N per tactel and metre");
+        assert!((estimate / stated - 1.0).abs() < 0.25, "{bench}: {estimate}, stated {stated} N per tactel and metre");
     }
 }
 

@@ -12,7 +12,7 @@ use tactflow_runtime::graph::{Request, compile};
 use tactflow_runtime::source::{Diagnostic, Report};
 use tactflow_tests::{catalogue, toml_files, workspace};
 
-use good::{good, good_at_second_sight, good_behind_nodes};
+use good::{good, good_at_second_sight, good_behind_nodes, good_by_turns};
 use poor::{opposed, poor_behind_nodes, poor_gains, poor_modes, poor_sums, wrong_columns};
 use variant::{graph, variant};
 
@@ -56,7 +56,10 @@ fn each_poor_controller_gets_its_warning_and_no_other() {
 
 #[test]
 fn no_good_controller_is_blamed() {
-    let good = [good(), good_behind_nodes(), good_at_second_sight()].into_iter().flatten().collect::<Vec<_>>();
+    let good = [good(), good_behind_nodes(), good_at_second_sight(), good_by_turns()]
+        .into_iter()
+        .flatten()
+        .collect::<Vec<_>>();
     assert!(good.len() > 60, "{}", good.len());
     let reports = good.iter().filter_map(|variant| Some((variant, variant.warnings()?)));
     let wrong: Vec<String> = reports

@@ -185,3 +185,76 @@ pub(super) fn good_at_second_sight() -> Vec<Variant> {
         variant("force", &[&compared("set nodes.firm.above=2.0")[..], &["set nodes.firm.hysteresis=0.5"]].concat()),
     ]
 }
+
+/// Controllers whose parts act at different times, behind gates and switches.
+pub(super) fn good_by_turns() -> Vec<Variant> {
+    let firm = ["set nodes.firm={ type = \"compare\", in.value = \"touch.force\", above = 8.0 }"];
+    let soft = [
+        "set nodes.soft_pid={ type = \"pid\", in.error = \"error.error\", gains.x.kp = 1.0, gains.y.kp = 1.0, gains.pressure.kp = 0.2 }",
+        "set nodes.soft={ type = \"inverse_jacobian\", in.control = \"soft_pid.control\", columns.x = [-1, 0, 0, 0, 0, 0], columns.y = [0, -1, 0, 0, 0, 0], columns.pressure = [0, 0, 1, 0, 0, 0] }",
+    ];
+    let hold = [
+        "set nodes.hold={ type = \"hold_pose\", in.pose = \"move.sensor_pose\", speed_m_per_s = 0.02, speed_rad_per_s = 0.1 }",
+    ];
+    let back = "set nodes.back={ type = \"twist_source\", twist = [0, 0, -0.01, 0, 0, 0] }";
+    let switch = |select: &str, on: &str, off: &str| {
+        [
+            format!(
+                "set nodes.either={{ type = \"twist_switch\", in.select = \"{select}\", in.on = \"{on}\", in.off = \"{off}\" }}"
+            ),
+            "set nodes.sum.in.touch=\"either.value\"".to_owned(),
+        ]
+    };
+    let hybrid = |fixed: &[&str], more: &[String]| Variant {
+        task: "hybrid",
+        bench: None,
+        changes: fixed.iter().map(|change| (*change).to_owned()).chain(more.iter().cloned()).collect(),
+    };
+    let gate = |node: &str, value: &str, gate: &str| {
+        format!("set nodes.{node}={{ type = \"twist_gate\", in.value = \"{value}\", in.gate = \"{gate}\" }}")
+    };
+    vec![
+        // A soft controller while the force is large.
+        hybrid(&[&firm[..], &soft].concat(), &switch("firm.is_met", "soft.twist", "projector.twist")),
+        // The same control, selected differently.
+        hybrid(
+            &[
+                "set nodes.both={ type = \"projector\", in.twist = \"jacobian.twist\", select = [1, 0, 1, 0, 0, 0] }",
+                firm[0],
+            ],
+            &switch("firm.is_met", "both.twist", "projector.twist"),
+        ),
+        // Two controllers, each in a mode of its own.
+        hybrid(
+            &[&soft[..], &["set nodes.sum.in.touch=\"own.value\"", "set nodes.sum.in.soft=\"other.value\""]].concat(),
+            &[gate("own", "projector.twist", "modes.servo"), gate("other", "soft.twist", "modes.approach")],
+        ),
+        // Held while nothing is touched.
+        hybrid(&hold, &switch("touch.present", "projector.twist", "hold.twist")),
+        // A retreat while the force is large.
+        hybrid(&[firm[0], back], &switch("firm.is_met", "back.twist", "projector.twist")),
+        // A retreat in a mode of its own.
+        hybrid(&[back, "set nodes.sum.in.back=\"away.value\""], &[gate("away", "back.twist", "modes.approach")]),
+        // A value that is held through a delay ends a mode.
+        variant(
+            "hybrid",
+            &[
+                "set nodes.kept={ type = \"delay\", unit = \"m\", in.value = \"smooth.value\" }",
+                "set nodes.smooth={ type = \"low_pass\", in.value = \"kept.value\", time_constant_ms = 100 }",
+                "set modes.servo.go={ to = \"approach\", when = \"kept.value\", above = 0.05, for_ms = 100 }",
+            ],
+        ),
+        // It waits at rest until it is touched, and approaches in another mode.
+        variant(
+            "force",
+            &[
+                "start = \"wait\"",
+                "+[modes.wait]",
+                "+set.projector.select = [0, 0, 0, 0, 0, 0]",
+                "+go = { to = \"servo\", when = \"touch.present\", for_ms = 40 }",
+                "+fail = { after_ms = 10000 }",
+                "set modes.servo.go={ to = \"approach\", on = \"again\" }",
+            ],
+        ),
+    ]
+}

@@ -78,8 +78,9 @@ pub struct Params {
 /// are faults that name the message and the field. If the simulator still listens, the device brings the arm to rest
 /// before it disconnects.
 ///
-/// It states the facts `urdf`, `tip` and, if they are given, `home` and `joint_n_m_per_rad` of the arm, and `dead`, `threshold`, `pressure`,
-/// `calibration`, `mount`, `rest_frames` and `tare_bound` of the pad. The `contact` that a task reports is sent as `est`.
+/// It states the facts `urdf`, `tip` and, if they are given, `home` and `joint_n_m_per_rad` of the arm, and `dead`,
+/// `threshold`, `pressure`, `calibration`, `mount`, `rest_frames` and `tare_bound` of the pad. The `contact` that a task
+/// reports is sent as `est`.
 ///
 /// ```toml
 /// [roles]

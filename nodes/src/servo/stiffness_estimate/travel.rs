@@ -50,7 +50,9 @@ impl Travel {
     /// The sensor meets an object while it moves: before the first step, it has moved as in this step.
     pub(super) fn lagging(&mut self, step: f64, dt: f64, lag: f64) -> f64 {
         let share = if lag > 0.0 { -libm::expm1(-dt / lag) } else { 1.0 };
-        let behind = step + self.behind.unwrap_or(step * (1.0 - share) / share);
+        // No time has passed: what came before is not known yet.
+        let Some(before) = self.behind.or((share > 0.0).then(|| step * (1.0 - share) / share)) else { return 0.0 };
+        let behind = step + before;
         let passed = share * behind;
         self.behind = Some(behind - passed);
         passed

@@ -6,8 +6,6 @@ use tactflow_runtime::graph::OutlinedBlock;
 use super::filters::{Filter, way};
 use super::schedule::Schedule;
 use super::settings::{Nodes, source};
-use super::shape::Shape;
-use crate::motion::COMPONENTS;
 
 /// What a twist is made of.
 #[derive(Debug, Default, Serialize)]
@@ -45,6 +43,9 @@ pub(crate) struct Feature {
     /// The flags without which it moves nothing.
     #[serde(skip)]
     pub(crate) gates: Vec<String>,
+    /// The switches that it passes, with the number of the side, where the selection is not known.
+    #[serde(skip)]
+    pub(crate) sides: Vec<(String, usize)>,
     /// What multiplies all three gains, depending on the contact.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub(crate) schedules: Vec<Schedule>,
@@ -58,6 +59,9 @@ pub(crate) struct Feature {
 pub(crate) struct Constant {
     pub(crate) node: String,
     pub(crate) twist: [f64; 6],
+    /// Whether no gate or switch stands in its way that may be closed.
+    #[serde(skip)]
+    pub(crate) is_free: bool,
 }
 
 /// A node that moves the arm by a law of its own.
@@ -68,6 +72,9 @@ pub(crate) struct Guidance {
     pub(crate) kind: String,
     /// Components that the projectors behind it pass.
     pub(crate) passes: [bool; 6],
+    /// Whether no gate or switch stands in its way that may be closed.
+    #[serde(skip)]
+    pub(crate) is_free: bool,
 }
 
 impl Guidance {
@@ -102,14 +109,41 @@ impl Feature {
         self.measured.as_ref()?.rsplit('.').next()
     }
 
-    /// Adds a node that its motion passes.
-    fn pass(&mut self, nodes: &Nodes<'_>, node: &OutlinedBlock) {
-        self.gates.extend(source(node, "gate").map(str::to_owned));
-        if node.kind.text == "twist_delay" {
-            let (node, kind) = (node.name.clone(), node.kind.text.clone());
-            let shape = Shape::Delay { samples: 1.0 };
-            self.filters.push(Filter { node, kind, delay_s: shape.delay(nodes.period()), shape });
-        }
+    /// Returns whether both pass the same filters, gates, schedules and sides of switches.
+    pub(super) fn takes_the_way_of(&self, other: &Self) -> bool {
+        let filters = |one: &Self| one.filters.iter().map(|filter| filter.node.clone()).collect::<Vec<_>>();
+        let schedules = |one: &Self| one.schedules.iter().map(|schedule| schedule.node.clone()).collect::<Vec<_>>();
+        filters(self) == filters(other)
+            && schedules(self) == schedules(other)
+            && (&self.gates, &self.sides) == (&other.gates, &other.sides)
+    }
+
+    /// Returns whether both are the same control.
+    pub(super) fn is_same_control(&self, other: &Self) -> bool {
+        self.pid == other.pid && self.name == other.name && self.takes_the_way_of(other)
+    }
+
+    /// Returns whether another feature moves the arm by the same measurement at the same time.
+    pub(super) fn is_beside(&self, nodes: &Nodes<'_>, other: &Self) -> bool {
+        let is_other_side = |(switch, side): &(String, usize)| {
+            self.sides.iter().any(|(own, own_side)| own == switch && own_side != side)
+        };
+        let closes = |gate: &String| nodes.is_set(gate) == Some(false);
+        // Two gates that are not the same may open at different times.
+        let own_gate = |one: &Self, two: &Self| one.gates.iter().any(|gate| !two.gates.contains(gate));
+        other.moves()
+            && other.measured.is_some()
+            && other.measured == self.measured
+            && !other.sides.iter().any(is_other_side)
+            && !other.gates.iter().any(closes)
+            && !(own_gate(self, other) && own_gate(other, self))
+    }
+
+    /// Returns whether it moves the arm whenever it is present: no gate or switch stands in its way that may be closed
+    /// during a contact.
+    pub(crate) fn is_free(&self, nodes: &Nodes<'_>) -> bool {
+        let is_open = |gate: &String| nodes.is_set(gate) == Some(true) || gate.ends_with(".present");
+        self.sides.is_empty() && self.gates.iter().all(is_open)
     }
 
     /// Returns the delay of the filters that smooth it [s].
@@ -123,63 +157,6 @@ impl Feature {
     }
 }
 
-/// Returns what the twist of a port is made of.
-pub(crate) fn law(nodes: &Nodes<'_>, port: &str) -> Law {
-    let mut law = Law::default();
-    collect(nodes, port, [true; 6], &mut law, &mut Vec::new());
-    let alone = law.features.clone();
-    for (i, feature) in law.features.iter_mut().enumerate() {
-        let others = alone.iter().enumerate().filter(|(other, _)| *other != i).map(|(_, other)| other);
-        let is_beside =
-            |other: &&Feature| other.moves() && other.measured.is_some() && other.measured == feature.measured;
-        feature.beside = others.filter(is_beside).cloned().collect();
-    }
-    law
-}
-
-/// Adds what moves a twist. A port that leads back to a node of the path, through a `twist_delay`, adds nothing.
-fn collect<'a>(nodes: &Nodes<'a>, port: &str, passes: [bool; 6], law: &mut Law, path: &mut Vec<&'a str>) {
-    let Some(node) = nodes.writer(port).filter(|node| !path.contains(&&*node.name)) else { return };
-    path.push(&node.name);
-    let masked = |values: [f64; 6]| std::array::from_fn(|i| if passes[i] { values[i] } else { 0.0 });
-    match node.kind.text.as_str() {
-        "twist_adder" => node.wires.iter().for_each(|wire| collect(nodes, &wire.source, passes, law, path)),
-        "projector" => {
-            let select: [f64; 6] =
-                nodes.value(node, "select").and_then(|select| select.value.read()).unwrap_or_default();
-            let passes = std::array::from_fn(|i| passes[i] && select[i] != 0.0);
-            source(node, "twist").into_iter().for_each(|twist| collect(nodes, twist, passes, law, path));
-        }
-        "pivot" => source(node, "twist").into_iter().for_each(|twist| collect(nodes, twist, passes, law, path)),
-        "twist_switch" => nodes.sides(node).for_each(|side| collect(nodes, side, passes, law, path)),
-        "twist_gate" | "twist_delay" => {
-            let before = law.features.len();
-            source(node, "value").into_iter().for_each(|twist| collect(nodes, twist, passes, law, path));
-            law.features[before..].iter_mut().for_each(|feature| feature.pass(nodes, node));
-        }
-        "compose_twist" => {
-            let is_wired = |i: usize| source(node, COMPONENTS[i]).is_some();
-            let passes = std::array::from_fn(|i| passes[i] && is_wired(i));
-            law.guidance.push(Guidance { port: port.to_owned(), kind: node.kind.text.clone(), passes });
-        }
-        "twist_source" => {
-            let twist: [f64; 6] = nodes.value(node, "twist").and_then(|twist| twist.value.read()).unwrap_or_default();
-            let twist = masked(twist);
-            if twist.iter().any(|part| *part != 0.0) {
-                law.constants.push(Constant { node: node.name.clone(), twist });
-            }
-        }
-        "inverse_jacobian" => {
-            let columns = nodes.values(node).filter_map(|(path, setting)| {
-                Some((path.strip_prefix("columns.")?.to_owned(), masked(setting.value.read()?)))
-            });
-            law.features.extend(columns.map(|(name, column)| feature(nodes, node, name, column)));
-        }
-        kind => law.guidance.push(Guidance { port: port.to_owned(), kind: kind.to_owned(), passes }),
-    }
-    path.pop();
-}
-
 /// Returns the setpoint of a feature in a node that compares it.
 pub(crate) fn setpoint(nodes: &Nodes<'_>, compared: &str, feature: &str) -> Option<f64> {
     let node = nodes.node(compared)?;
@@ -188,7 +165,7 @@ pub(crate) fn setpoint(nodes: &Nodes<'_>, compared: &str, feature: &str) -> Opti
 }
 
 /// Follows a feature from its column back to its measurement.
-fn feature<'a>(nodes: &Nodes<'a>, jacobian: &'a OutlinedBlock, name: String, column: [f64; 6]) -> Feature {
+pub(super) fn feature<'a>(nodes: &Nodes<'a>, jacobian: &'a OutlinedBlock, name: String, column: [f64; 6]) -> Feature {
     let before = |node: &'a OutlinedBlock, input: &str, kind: &str| {
         source(node, input).and_then(|port| nodes.writer(port)).filter(|writer| writer.kind.text == kind)
     };
@@ -202,11 +179,28 @@ fn feature<'a>(nodes: &Nodes<'a>, jacobian: &'a OutlinedBlock, name: String, col
     let way = error.and_then(|error| source(error, &name)).map(|port| way(nodes, port));
     let measured = way.as_ref().map(|way| way.measured.clone());
     let (filters, gates) = way.map(|way| (way.filters, way.gates)).unwrap_or_default();
+    let sides = Vec::new();
     let [kp, ki, kd] = ["kp", "ki", "kd"].map(gain);
     let compared = error.map(|error| error.name.clone());
     let pid = pid.map(|pid| pid.name.clone());
     let schedules = scheduled.into_iter().filter_map(|node| Schedule::of(nodes, node, &name, measured.as_deref()));
     let schedules = schedules.collect();
     let (jacobian, beside) = (jacobian.name.clone(), Vec::new());
-    Feature { column, kp, ki, kd, measured, setpoint, filters, gates, schedules, name, jacobian, pid, compared, beside }
+    Feature {
+        column,
+        kp,
+        ki,
+        kd,
+        measured,
+        setpoint,
+        filters,
+        gates,
+        sides,
+        schedules,
+        name,
+        jacobian,
+        pid,
+        compared,
+        beside,
+    }
 }

@@ -40,14 +40,22 @@ impl Loop {
         let answer = contact.answer(feature.quantity()?)?;
         let latency_ms = answer.latency_ms.unwrap_or(contact.latency_ms);
         let (copies, others): (Vec<&Feature>, Vec<&Feature>) =
-            feature.beside.iter().partition(|other| other.pid == feature.pid && other.name == feature.name);
-        // The same control that moves the arm on several ways.
+            feature.beside.iter().partition(|other| other.is_same_control(feature));
+        // The same control that moves the arm by several nodes.
         let column = std::array::from_fn(|i| feature.column[i] + copies.iter().map(|copy| copy.column[i]).sum::<f64>());
         let around = Self::new(&Feature { column, ..feature.clone() }, &answer, latency_ms * 1e-3, period);
         let factors = feature.schedules.iter().map(|schedule| schedule.factor(&answer));
         let factor = factors.product::<Option<f64>>()?;
-        let beside: Option<Vec<Self>> = others.into_iter().map(|other| Self::over(other, contact, period)).collect();
-        (around.gain != 0.0).then_some(Self { beside: beside?, ..around.times(factor) })
+        let mut beside = Vec::new();
+        for other in others {
+            let other = Feature { beside: Vec::new(), ..other.clone() };
+            // One that only moves what does not change the feature adds nothing.
+            let row = answer.row().iter().zip(other.column).map(|(answer, column)| answer * column).sum::<f64>();
+            if row != 0.0 {
+                beside.push(Self::over(&other, contact, period)?);
+            }
+        }
+        (around.gain != 0.0).then_some(Self { beside, ..around.times(factor) })
     }
 
     /// Returns the loop of a feature, with the latency and the period [s].

@@ -12,8 +12,9 @@ use tactflow_runtime::cli::{GraphArgs, Shell};
 use tactflow_runtime::graph::{Compiled, compile};
 
 use super::control::chain::{Limiter, chain};
+use super::control::collect::law;
 use super::control::contacts::contacts;
-use super::control::law::{Law, law};
+use super::control::law::Law;
 use super::control::settings::{self, Ends, Index, Nodes};
 use stability::{Stability, stability};
 use touch::{Approach, approaches};

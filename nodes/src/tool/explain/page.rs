@@ -117,6 +117,11 @@ fn scheduled(feature: &Feature, schedule: &Schedule) -> String {
 /// Says what else answers the same measurement.
 fn together(feature: &Feature) -> Option<String> {
     let measured = feature.measured.as_ref().filter(|_| !feature.beside.is_empty())?;
+    // Once for all that answer it.
+    let order = |one: &Feature| (one.jacobian.clone(), one.name.clone());
+    if feature.beside.iter().any(|other| order(other) < order(feature)) {
+        return None;
+    }
     let others: Vec<String> =
         feature.beside.iter().map(|other| format!("`{}` of `{}`", other.name, other.jacobian)).collect();
     let (name, jacobian, others) = (&feature.name, &feature.jacobian, others.join(" and "));

@@ -9,8 +9,9 @@ use tactflow_runtime::source::{Code, Diagnostic, Diagnostics, Edit, Item};
 use super::rows::{Answer, Row};
 use super::{Controlled, ModeLaw};
 use crate::motion::COMPONENTS;
+use crate::tool::control::collect::law;
 use crate::tool::control::contacts::Contact;
-use crate::tool::control::law::{Feature, Law, law};
+use crate::tool::control::law::{Feature, Law};
 use crate::tool::control::settings::{Nodes, source};
 
 /// Largest angle between a line and an axis of the sensor along which the line lies [rad].

@@ -53,7 +53,7 @@ impl ModeLaw<'_> {
 
 impl Exit<'_> {
     /// Returns whether a `go` waits until there is no contact.
-    fn is_lost(&self) -> bool {
+    pub(super) fn is_lost(&self) -> bool {
         let is_contact = self.word("when").is_some_and(|port| port.ends_with(".present"));
         is_contact && matches!(self.word("is"), Some("false" | "absent"))
     }

@@ -12,8 +12,9 @@ pub(super) fn check(arm: &Controlled<'_>, found: &mut Diagnostics) {
     for mode in &arm.modes {
         found.extend(mode.moving().filter_map(|feature| unfiltered(mode, feature)));
         found.extend(mode.moving().filter_map(|feature| windup(arm, mode, feature)));
-        found.extend(mode.law.features.iter().filter_map(|feature| resting(arm, mode, feature)));
     }
+    let first = arm.modes.first().into_iter();
+    found.extend(first.flat_map(|mode| mode.law.features.iter().filter_map(|feature| resting(arm, mode, feature))));
 }
 
 /// Returns the warning about a feature that has no gain in any mode. One that rests in some modes is right.

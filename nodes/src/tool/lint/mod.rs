@@ -23,8 +23,9 @@ use tactflow_runtime::graph::{NO_SPAN, Outline, OutlinedMode};
 use tactflow_runtime::source::{Code, Diagnostics};
 
 use super::control::chain::{Limiter, chain};
+use super::control::collect::law;
 use super::control::contacts::{Contact, contacts};
-use super::control::law::{Feature, Guidance, Law, law};
+use super::control::law::{Feature, Guidance, Law};
 use super::control::settings::{Index, Nodes, commands};
 
 /// An arm and what moves it.
@@ -59,9 +60,8 @@ pub(crate) fn lint(outline: &Outline, facts: &[(String, toml::Value)]) -> Diagno
     let carried = carried(outline);
     let mut found = Diagnostics::new();
     for (command, port) in &commands {
-        let arm = command.split('.').next().unwrap_or_default();
-        found.extend(unread::check(outline, facts, arm));
-        let name = arm;
+        let name = command.split('.').next().unwrap_or_default();
+        found.extend(unread::check(outline, facts, name));
         let Some(arm) = controlled((outline, &index, &carried), facts, (command, port)) else { continue };
         found.extend(unread::misnamed(outline, &arm, name));
         let before = found.len();
@@ -149,6 +149,12 @@ impl ModeLaw<'_> {
     fn column(&self, feature: &Feature) -> Option<[f64; 6]> {
         let jacobian = self.nodes.node(&feature.jacobian)?;
         self.nodes.value(jacobian, &format!("columns.{}", feature.name))?.value.read()
+    }
+
+    /// Returns the largest control of a feature.
+    fn limit(&self, feature: &Feature) -> Option<f64> {
+        let pid = self.nodes.node(feature.pid.as_deref()?)?;
+        self.nodes.number(pid, &format!("gains.{}.limit", feature.name))
     }
 
     /// Returns the place of the column of a feature.

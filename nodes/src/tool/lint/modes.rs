@@ -37,7 +37,12 @@ fn motionless(arm: &Controlled<'_>, mode: &ModeLaw<'_>) -> Option<Diagnostic> {
         let twist = mode.nodes.value(node, "twist").and_then(|twist| twist.value.read::<[f64; 6]>());
         node.kind.text == "twist_source" && twist.is_some_and(|twist| twist.iter().any(|part| *part != 0.0))
     };
-    let node = upstream(mode, &arm.twist).into_iter().find(moves)?;
+    // It may rest until it is touched, and move in another mode.
+    let rests = |node: &&OutlinedBlock| {
+        let mut constants = arm.modes.iter().flat_map(|mode| &mode.law.constants);
+        constants.all(|constant| constant.node != node.name)
+    };
+    let node = upstream(mode, &arm.twist).into_iter().filter(moves).find(rests)?;
     let (name, own) = (&node.name, mode.mode?.name.as_str());
     let message = format!("mode `{own}` waits for a contact, but no projector passes the motion of `{name}`");
     let help = format!("select the components of `{name}` in this mode, or add its twist behind the projector");

@@ -2,6 +2,7 @@
 
 use tactflow_runtime::source::{Code, Diagnostic, Diagnostics};
 
+use super::exits::Exit;
 use super::modes::GUIDES;
 use super::{Controlled, ModeLaw};
 use crate::motion::COMPONENTS;
@@ -20,8 +21,10 @@ fn retreat(mode: &ModeLaw<'_>) -> Option<Diagnostic> {
     let (node, speed) = away(mode)?;
     let presses = |feature: &&Feature| {
         let is_force = matches!(mode.quantity(feature), Some("pressure" | "force"));
-        let most = feature.setpoint.map(|setpoint| feature.kp * feature.column[2] * setpoint);
-        is_force && most.is_some_and(|most| most >= speed)
+        let least = feature.schedules.iter().map(|schedule| schedule.min).product::<f64>();
+        let limit = mode.limit(feature).unwrap_or(f64::INFINITY);
+        let most = feature.setpoint.map(|setpoint| (feature.kp * least * setpoint).min(limit) * feature.column[2]);
+        is_force && feature.is_free(&mode.nodes) && most.is_some_and(|most| most > 0.0 && most >= speed)
     };
     let feature = mode.moving().find(presses)?;
     let message = format!(
@@ -34,10 +37,11 @@ fn retreat(mode: &ModeLaw<'_>) -> Option<Diagnostic> {
 
 /// Returns the node that moves the sensor away from the object in a mode, and its speed [m/s].
 fn away<'a>(mode: &'a ModeLaw<'_>) -> Option<(&'a str, f64)> {
+    let all_free = mode.law.constants.iter().all(|constant| constant.is_free || constant.twist[2] == 0.0);
     let constants = || mode.law.constants.iter().map(|constant| (&*constant.node, constant.twist[2]));
     let speed: f64 = constants().map(|(_, speed)| speed).sum();
-    let constant = constants().find(|_| speed < 0.0).map(|(node, _)| (node, -speed));
-    let parks = |guide: &&Guidance| guide.kind == "park" && guide.passes[2] && !mode.rests(guide);
+    let constant = constants().find(|(_, own)| all_free && speed < 0.0 && *own < 0.0).map(|(node, _)| (node, -speed));
+    let parks = |guide: &&Guidance| guide.kind == "park" && guide.is_free && guide.passes[2] && !mode.rests(guide);
     // It is slower at the end of its way.
     let park = || mode.law.guidance.iter().find(parks).map(|guide| (guide.node(), 0.0));
     constant.or_else(park)
@@ -48,7 +52,8 @@ fn held(mode: &ModeLaw<'_>) -> Option<Diagnostic> {
     let (guide, feature, i) = mode.law.guidance.iter().find_map(|guide| {
         let holds = holds(mode, guide)?;
         let moves = |feature: &Feature| (0..6).find(|i| holds[*i] && guide.passes[*i] && feature.column[*i] != 0.0);
-        mode.moving().find_map(|feature| Some((guide, feature, moves(feature)?)))
+        let mut free = mode.moving().filter(|feature| guide.is_free && feature.is_free(&mode.nodes));
+        free.find_map(|feature| Some((guide, feature, moves(feature)?)))
     })?;
     let message = format!(
         "{}`{}` and `{}` both move `{}`: one holds the sensor at a place, the other one moves it to its setpoint, and it \
@@ -87,12 +92,13 @@ fn push(arm: &Controlled<'_>, mode: &ModeLaw<'_>) -> Option<Diagnostic> {
     if speed <= 0.0 || controls(mode) || feels || mode.law.guidance.iter().any(presses) {
         return None;
     }
-    let before = |other: &&ModeLaw<'_>| controls(other) && other.exits("go").any(|exit| exit.to == mode.own_name());
+    let leads = |exit: Exit<'_>| exit.to == mode.own_name() && !exit.is_lost();
+    let before = |other: &&ModeLaw<'_>| controls(other) && other.exits("go").any(leads);
     let before = arm.modes.iter().find(before)?;
     let constant = mode.law.constants.iter().find(|constant| constant.twist[2] > 0.0)?;
     let message = format!(
-        "{}`{}` moves the sensor into the object with {speed} m/s: mode `{}` ends with a contact, and here no exit waits for \
-         what the pad feels",
+        "{}`{}` moves the sensor into the object with {speed} m/s: mode `{}` before it presses, and no exit of this one waits \
+         for what the pad feels",
         mode.named(),
         constant.node,
         before.own_name()

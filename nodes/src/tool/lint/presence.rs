@@ -36,21 +36,14 @@ fn barred<'f>(arm: &Controlled<'_>, mode: &ModeLaw<'_>, feature: &'f Feature) ->
     })
 }
 
-/// Returns why a comparison never sets its flag: it needs a larger force than the task or a limit allows.
+/// Returns why a comparison never sets its flag: it needs a larger force than a limit allows.
 fn out_of_reach(arm: &Controlled<'_>, mode: &ModeLaw<'_>, flag: &str) -> Option<String> {
     let node = mode.nodes.writer(flag).filter(|node| node.kind.text == "compare")?;
     let above = mode.nodes.number(node, "above")?;
     let port = way(&mode.nodes, source(node, "value")?).measured;
     let quantity = mode.quantity_of(&port)?;
     let (limit, key) = force_limit(arm, mode, quantity)?;
-    let held = mode.moving().find(|feature| feature.measured.as_ref() == Some(&port));
-    match held.and_then(|feature| feature.setpoint) {
-        _ if above >= limit => Some(format!("which is set above {above}, where the limit `{key}` is {limit}")),
-        Some(setpoint) if above > setpoint => {
-            Some(format!("which is set above {above}, where `{quantity}` is held at {setpoint}"))
-        }
-        _ => None,
-    }
+    (above >= limit).then(|| format!("which is set above {above}, where the limit `{key}` is {limit}"))
 }
 
 /// Returns whether a flag is the opposite of a contact.

@@ -1,5 +1,6 @@
 //! Loops that are near instability over a contact, and filters that take their margin.
 
+use std::cmp::Ordering;
 use std::collections::{BTreeMap, BTreeSet};
 
 use tactflow_runtime::source::{Code, Diagnostic, Diagnostics, Edit};
@@ -42,12 +43,25 @@ pub(super) fn check(arm: &Controlled<'_>, found: &mut Diagnostics) {
     let mut seen = BTreeSet::new();
     for mode in &arm.modes {
         let period = mode.nodes.period();
-        for feature in mode.moving().filter(|feature| feature.kp > 0.0 && feature.kp * period < DIVERGES) {
+        for feature in
+            mode.moving().filter(|feature| feature.kp > 0.0 && feature.kp * period < DIVERGES && is_largest(feature))
+        {
             if is_known(mode, feature, contacts) && seen.insert(key(feature)) {
                 found.extend(judge(mode, feature, contacts));
             }
         }
     }
+}
+
+/// Returns whether a loop has the largest gain of those that answer its measurement together: the first one of equal
+/// ones. The others have the same margins.
+fn is_largest(feature: &Feature) -> bool {
+    let gain = |one: &Feature| one.kp * one.column.iter().fold(0.0, |most: f64, entry| most.max(entry.abs()));
+    let order = |one: &Feature| (one.jacobian.clone(), one.name.clone());
+    feature.beside.iter().all(|other| match gain(feature).total_cmp(&gain(other)) {
+        Ordering::Equal => order(feature) <= order(other),
+        found => found == Ordering::Greater,
+    })
 }
 
 /// Returns whether geometry or a contact of the bench says how a feature answers.

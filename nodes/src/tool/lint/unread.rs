@@ -32,12 +32,17 @@ pub(super) fn misnamed(outline: &Outline, arm: &Controlled<'_>, name: &str) -> D
     let features = || arm.modes.iter().flat_map(|mode| mode.moving());
     let meant = |key: &str, contact: &Contact| {
         let own = features().find(|one| one.name == key).and_then(Feature::quantity);
-        let near = suggest_name(key, features().filter_map(Feature::quantity));
+        let near = suggest_name(key, features().filter_map(Feature::quantity)).filter(|_| !key.is_empty());
         own.or(near).filter(|quantity| !contact.features.contains_key(*quantity))
     };
-    let each = arm.contacts.iter().flat_map(|contact| contact.features.keys().map(move |key| (key, contact)));
-    let found = each.filter(|(key, _)| !is_port(key)).filter_map(|(key, contact)| {
-        let (quantity, place) = (meant(key, contact)?, key_in(value, key)?);
+    let entries = match &value.item {
+        Item::Array(entries) => &entries[..],
+        _ => &[],
+    };
+    let contacts = arm.contacts.iter().zip(entries);
+    let each = contacts.flat_map(|(contact, entry)| contact.features.keys().map(move |key| (key, contact, entry)));
+    let found = each.filter(|(key, ..)| !is_port(key)).filter_map(|(key, contact, entry)| {
+        let (quantity, place) = (meant(key, contact)?, key_in(entry, key)?);
         let message =
             format!("no port is called `{key}`, so no loop is checked with this answer of `{}`", contact.object);
         let help = format!("a contact names the port that is measured: write `{quantity}`");
@@ -61,9 +66,6 @@ fn place(name: &str, arm: &str, value: &Value, why: &str) -> Range<usize> {
 
 /// Returns the place of a key in a value.
 fn key_in(value: &Value, wanted: &str) -> Option<Range<usize>> {
-    if let Item::Array(values) = &value.item {
-        return values.iter().find_map(|value| key_in(value, wanted));
-    }
     let entries = &value.as_table()?.entries;
     let own = entries.iter().find(|(key, _)| key.name == wanted).map(|(key, _)| key.span.clone());
     own.or_else(|| entries.iter().find_map(|(_, value)| key_in(value, wanted)))

@@ -3,7 +3,8 @@
 use tactflow_runtime::graph::OutlinedMode;
 
 use super::TuneArgs;
-use crate::tool::control::law::{Feature, law};
+use crate::tool::control::collect::law;
+use crate::tool::control::law::Feature;
 use crate::tool::control::schedule::Schedule;
 use crate::tool::control::settings::{Index, Nodes};
 

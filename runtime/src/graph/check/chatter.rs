@@ -45,7 +45,7 @@ pub(crate) fn check(
         let Some(cause) = cause(&conditions).filter(|cause| cause.is_fast(&ring, period)) else { continue };
         let is_reported = ring.iter().any(|step| ways.immediate(step.from, step.exit).is_some());
         if !is_reported && cause.stays(net, contact, &ring) && marked.insert(back(&ring)) {
-            diagnostics.push(report(modes, &ring, help(&ring, cause, period)));
+            diagnostics.push(report(modes, &ring, help(&ring, &conditions, cause, period)));
         }
     }
 }
@@ -202,8 +202,8 @@ fn report(modes: &[PlannedMode], ring: &[Step<'_>], help: String) -> Diagnostic 
 }
 
 /// Returns what ends the chatter of a ring. The period is in [ns].
-fn help(ring: &[Step<'_>], cause: Cause, period: i64) -> String {
-    let bounds = |step: &Step<'_>| range(&step.exit.condition).map(|(_, bounds)| bounds);
+fn help(ring: &[Step<'_>], conditions: &[Condition], cause: Cause, period: i64) -> String {
+    let bounds = |i: usize| range(&conditions[i]).map(|(_, bounds)| bounds);
     match (cause, ring) {
         (Cause::Time, _) => "let the modes last longer, or let one of them wait for something else".into(),
         (Cause::Contact, [.., back]) => {
@@ -211,16 +211,15 @@ fn help(ring: &[Step<'_>], cause: Cause, period: i64) -> String {
             let time_ms = (5.0 * period as f64 / 1e6).max(100.0);
             format!("let the way back wait for longer, for example `{key} = {time_ms}`")
         }
-        (_, [there, back]) => match bounds(there).zip(bounds(back)).and_then(|(there, back)| apart(there, back)) {
+        (_, [_, back]) if is_flag(back) => {
+            "let the node that sets the flag leave a gap that is wider than the noise: `hysteresis` in a comparison"
+                .into()
+        }
+        (_, [_, _]) => match bounds(0).zip(bounds(1)).and_then(|(there, back)| apart(there, back)) {
             Some(bound) => format!(
                 "leave a gap, so that noise does not switch back: for example {bound}. `hysteresis` leaves none: it \
                  counts within one mode"
             ),
-            None if is_flag(there) || is_flag(back) => {
-                "let the node that sets the flag leave a gap that is wider than the noise: `hysteresis` in a comparison, or \
-                 another bound on the way back"
-                    .into()
-            }
             None => "leave a gap between the two bounds that is wider than the noise".into(),
         },
         _ => "leave a gap between two of the bounds, so that no value is within all of them".into(),

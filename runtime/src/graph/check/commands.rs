@@ -28,7 +28,7 @@ pub(crate) fn check(net: &Net<'_>, diagnostics: &mut Diagnostics) {
                 let diagnostic = Diagnostic::new(Code::UndrivenCommand, key.span.clone(), message);
                 // With two arms, the port of that name may move the other one.
                 let is_only = net.flat.roles.iter().filter(|(_, other)| other.value == kind.value).count() == 1;
-                diagnostics.push(match net.find_candidate(0, usize::MAX, command).filter(|_| is_only) {
+                diagnostics.push(match net.find_candidate(0, None, command).filter(|_| is_only) {
                     Some(port) => {
                         let line = format!("{}.{} = \"{port}\"", key.name, command.name);
                         let last = net.flat.commands.last().map(|entry| &entry.wire.key.span);

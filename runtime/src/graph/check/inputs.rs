@@ -16,7 +16,7 @@ pub(crate) fn check(net: &Net<'_>, diagnostics: &mut Diagnostics) {
                 let (key, name) = (&node.block.key, &input.name);
                 let message = format!("`{}` needs a wire to `in.{name}`, {}", key.name, input.kind.with_article());
                 let diagnostic = Diagnostic::new(Code::MissingInput, key.span.clone(), message);
-                diagnostics.push(match net.find_candidate(node.scope, i, input) {
+                diagnostics.push(match net.find_candidate(node.scope, Some(i), input) {
                     Some(port) => {
                         let line = format!("in.{name} = \"{port}\"");
                         diagnostic.help(format!("add `{line}`")).edit(Edit::Below(key.span.clone(), line))

@@ -262,7 +262,7 @@ impl<'a> CommandPath<'a> {
         let mut block = format!("[nodes.{name}]\ntype = \"{name}\"\nin.{through} = \"{}\"", word.value);
         let needs = limiter.inputs.iter().filter(|input| input.need.must_be_wired && input.name != through);
         for input in needs {
-            block.push_str(&format!("\nin.{} = \"{}\"", input.name, net.find_candidate(scope, usize::MAX, input)?));
+            block.push_str(&format!("\nin.{} = \"{}\"", input.name, net.find_candidate(scope, None, input)?));
         }
         for param in limiter.params.iter().filter(|param| !param.is_optional) {
             let limit =

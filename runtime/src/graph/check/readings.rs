@@ -18,15 +18,23 @@ impl Readings {
     pub(super) fn origin(&self, net: &Net<'_>, condition: &Condition) -> Condition {
         let Condition::Port(WatchedPort { source, feature: None }, test) = condition else { return condition.clone() };
         let (mut port, mut test) = (*source, *test);
-        while let Some((before, same)) = self.before(net, port, test) {
+        // A delay can close a loop, which leads to no measurement.
+        for _ in 0..=net.wires.len() {
+            let Some((before, same)) = self.before(net, port, test) else {
+                return Condition::Port(WatchedPort { source: port, feature: None }, test);
+            };
             (port, test) = (before, same);
         }
-        Condition::Port(WatchedPort { source: port, feature: None }, test)
+        condition.clone()
     }
 
     /// Returns the port that the node of another one reads, and the same test of it.
     fn before(&self, net: &Net<'_>, port: PortRef, test: Test) -> Option<(PortRef, Test)> {
         let node = port.producer.node().filter(|_| port.port == 0)?;
+        // What it says holds with the parameters of the graph.
+        if (0..net.flat.modes.len()).any(|mode| net.setting(mode, node).is_some()) {
+            return None;
+        }
         let source = net.wires[node].iter().find(|wire| wire.input == 0)?.source;
         let test = match self.0[node] {
             Reading::Same if matches!(test, Test::Between { .. }) => test,

@@ -217,10 +217,11 @@ impl Net<'_> {
         self.scope_ports(scope).find(fits)
     }
 
-    /// Returns a port of the scope with the name and the kind of an input, as a suggestion for its wire.
-    pub(crate) fn find_candidate(&self, scope: usize, node: usize, input: &PortSpec) -> Option<&str> {
+    /// Returns a port of the scope with the name and the kind of an input of a node, as a suggestion for its wire.
+    pub(crate) fn find_candidate(&self, scope: usize, node: Option<usize>, input: &PortSpec) -> Option<&str> {
         // A port that follows from the node would close a loop.
-        self.scope_ports(scope).candidate(input, |producer| !self.upstream(producer.node())[node])
+        let follows = |producer: Producer| node.is_some_and(|node| self.upstream(producer.node())[node]);
+        self.scope_ports(scope).candidate(input, |producer| !follows(producer))
     }
 
     /// Returns the exports of the parts in the graph and in its tasks, and what the tasks call the roles: each with the
