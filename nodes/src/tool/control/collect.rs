@@ -10,7 +10,7 @@ use crate::motion::COMPONENTS;
 
 /// What stands between a node and the twist of the arm.
 #[derive(Debug, Clone)]
-struct Way {
+struct Passage {
     /// Components that the projectors pass.
     passes: [bool; 6],
     gates: Vec<String>,
@@ -19,13 +19,13 @@ struct Way {
     delays: Vec<Filter>,
 }
 
-impl Default for Way {
+impl Default for Passage {
     fn default() -> Self {
         Self { passes: [true; 6], gates: Vec::new(), sides: Vec::new(), delays: Vec::new() }
     }
 }
 
-impl Way {
+impl Passage {
     /// Returns a twist without the components that do not pass.
     fn masked(&self, values: [f64; 6]) -> [f64; 6] {
         std::array::from_fn(|i| if self.passes[i] { values[i] } else { 0.0 })
@@ -38,17 +38,17 @@ impl Way {
 
     /// Returns the way before a gate.
     fn gated(&self, flag: Option<&str>) -> Self {
-        let mut way = self.clone();
-        way.gates.extend(flag.map(str::to_owned));
-        way
+        let mut passage = self.clone();
+        passage.gates.extend(flag.map(str::to_owned));
+        passage
     }
 
     /// Returns the way before a delay.
     fn delayed(&self, nodes: &Nodes<'_>, node: &OutlinedBlock) -> Self {
-        let mut way = self.clone();
+        let mut passage = self.clone();
         let (node, kind, shape) = (node.name.clone(), node.kind.text.clone(), Shape::Delay { samples: 1.0 });
-        way.delays.push(Filter { node, kind, delay_s: shape.delay(nodes.period()), shape });
-        way
+        passage.delays.push(Filter { node, kind, delay_s: shape.delay(nodes.period()), shape });
+        passage
     }
 
     /// Returns whether nothing stands in the way that may be closed.
@@ -60,7 +60,7 @@ impl Way {
 /// Returns what the twist of a port is made of.
 pub(crate) fn law(nodes: &Nodes<'_>, port: &str) -> Law {
     let mut law = Law::default();
-    collect(nodes, port, &Way::default(), &mut law, &mut Vec::new());
+    collect(nodes, port, &Passage::default(), &mut law, &mut Vec::new());
     law.features = merged(std::mem::take(&mut law.features));
     let alone = law.features.clone();
     for (i, feature) in law.features.iter_mut().enumerate() {
@@ -74,9 +74,7 @@ pub(crate) fn law(nodes: &Nodes<'_>, port: &str) -> Law {
 fn merged(features: Vec<Feature>) -> Vec<Feature> {
     let mut merged: Vec<Feature> = Vec::new();
     for feature in features {
-        let is_copy = |other: &&mut Feature| {
-            other.jacobian == feature.jacobian && other.name == feature.name && other.takes_the_way_of(&feature)
-        };
+        let is_copy = |other: &&mut Feature| other.id() == feature.id() && other.takes_the_way_of(&feature);
         match merged.iter_mut().find(is_copy) {
             Some(copy) => copy.column.iter_mut().zip(feature.column).for_each(|(sum, entry)| *sum += entry),
             None => merged.push(feature),
@@ -87,63 +85,63 @@ fn merged(features: Vec<Feature>) -> Vec<Feature> {
 
 /// Adds what moves a twist. A port that leads back to a node of the path, through a `twist_delay`, adds nothing, and
 /// neither does one behind a gate that is closed in this mode.
-fn collect<'a>(nodes: &Nodes<'a>, port: &str, way: &Way, law: &mut Law, path: &mut Vec<&'a str>) {
+fn collect<'a>(nodes: &Nodes<'a>, port: &str, passage: &Passage, law: &mut Law, path: &mut Vec<&'a str>) {
     let Some(node) = nodes.writer(port).filter(|node| !path.contains(&&*node.name)) else { return };
     path.push(&node.name);
-    let mut follow = |input: &str, way: &Way, law: &mut Law| {
-        source(node, input).into_iter().for_each(|twist| collect(nodes, twist, way, law, path));
+    let mut follow = |input: &str, passage: &Passage, law: &mut Law| {
+        source(node, input).into_iter().for_each(|twist| collect(nodes, twist, passage, law, path));
     };
     match node.kind.text.as_str() {
-        "twist_adder" => node.wires.iter().for_each(|wire| follow(&wire.name, way, law)),
+        "twist_adder" => node.wires.iter().for_each(|wire| follow(&wire.name, passage, law)),
         "projector" => {
             let select: [f64; 6] =
                 nodes.value(node, "select").and_then(|select| select.value.read()).unwrap_or_default();
-            follow("twist", &way.selecting(|i| select[i] != 0.0), law);
+            follow("twist", &passage.selecting(|i| select[i] != 0.0), law);
         }
-        "pivot" => follow("twist", way, law),
-        "twist_switch" => switch(nodes, node, way, law, path),
+        "pivot" => follow("twist", passage, law),
+        "twist_switch" => switch(nodes, node, passage, law, path),
         "twist_gate" => {
             let flag = source(node, "gate");
             if flag.and_then(|flag| nodes.is_set(flag)) != Some(false) {
-                follow("value", &way.gated(flag), law);
+                follow("value", &passage.gated(flag), law);
             }
         }
-        "twist_delay" => follow("value", &way.delayed(nodes, node).gated(source(node, "gate")), law),
-        "twist_source" => law.constants.extend(constant(nodes, node, way)),
+        "twist_delay" => follow("value", &passage.delayed(nodes, node).gated(source(node, "gate")), law),
+        "twist_source" => law.constants.extend(constant(nodes, node, passage)),
         "inverse_jacobian" => {
             let columns = nodes.values(node).filter_map(|(path, setting)| {
-                Some((path.strip_prefix("columns.")?.to_owned(), way.masked(setting.value.read()?)))
+                Some((path.strip_prefix("columns.")?.to_owned(), passage.masked(setting.value.read()?)))
             });
             law.features.extend(columns.map(|(name, column)| {
                 let mut feature = feature(nodes, node, name, column);
-                feature.gates.extend(way.gates.iter().cloned());
-                feature.filters.extend(way.delays.iter().cloned());
-                feature.sides.clone_from(&way.sides);
+                feature.gates.extend(passage.gates.iter().cloned());
+                feature.filters.extend(passage.delays.iter().cloned());
+                feature.sides.clone_from(&passage.sides);
                 feature
             }));
         }
         kind => {
             let is_wired = |i: usize| kind != "compose_twist" || source(node, COMPONENTS[i]).is_some();
-            let (port, passes) = (port.to_owned(), way.selecting(is_wired).passes);
-            law.guidance.push(Guidance { port, kind: kind.to_owned(), passes, is_free: way.is_free(nodes) });
+            let (port, passes) = (port.to_owned(), passage.selecting(is_wired).passes);
+            law.guidance.push(Guidance { port, kind: kind.to_owned(), passes, is_free: passage.is_free(nodes) });
         }
     }
     path.pop();
 }
 
 /// Adds what moves the sides of a switch.
-fn switch<'a>(nodes: &Nodes<'a>, node: &'a OutlinedBlock, way: &Way, law: &mut Law, path: &mut Vec<&'a str>) {
+fn switch<'a>(nodes: &Nodes<'a>, node: &'a OutlinedBlock, passage: &Passage, law: &mut Law, path: &mut Vec<&'a str>) {
     let is_known = source(node, "select").is_some_and(|flag| nodes.is_set(flag).is_some());
     for (number, side) in nodes.sides(node).enumerate() {
-        let mut way = way.clone();
-        way.sides.extend((!is_known).then(|| (node.name.clone(), number)));
-        collect(nodes, side, &way, law, path);
+        let mut passage = passage.clone();
+        passage.sides.extend((!is_known).then(|| (node.name.clone(), number)));
+        collect(nodes, side, &passage, law, path);
     }
 }
 
 /// Returns the constant motion of a node; `None` if it is zero.
-fn constant(nodes: &Nodes<'_>, node: &OutlinedBlock, way: &Way) -> Option<Constant> {
-    let twist = way.masked(nodes.value(node, "twist").and_then(|twist| twist.value.read()).unwrap_or_default());
-    let is_free = way.is_free(nodes) && source(node, "gate").is_none();
+fn constant(nodes: &Nodes<'_>, node: &OutlinedBlock, passage: &Passage) -> Option<Constant> {
+    let twist = passage.masked(nodes.value(node, "twist").and_then(|twist| twist.value.read()).unwrap_or_default());
+    let is_free = passage.is_free(nodes) && source(node, "gate").is_none();
     twist.iter().any(|part| *part != 0.0).then(|| Constant { node: node.name.clone(), twist, is_free })
 }

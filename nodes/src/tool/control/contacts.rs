@@ -67,6 +67,11 @@ impl Answer {
         [self.vx, self.vy, self.vz, self.wx, self.wy, self.wz].map(Option::unwrap_or_default)
     }
 
+    /// Returns the change of the feature for one unit of a column.
+    pub(crate) fn along(&self, column: &[f64; 6]) -> f64 {
+        self.row().iter().zip(column).map(|(answer, entry)| answer * entry).sum()
+    }
+
     /// Returns the circular frequency [rad/s] and the damping ratio of the resonance.
     pub(crate) fn resonance(&self) -> Option<(f64, f64)> {
         let damping = self.damping_ratio.unwrap_or(USUAL_DAMPING);

@@ -109,6 +109,11 @@ impl Feature {
         self.measured.as_ref()?.rsplit('.').next()
     }
 
+    /// Returns the node that turns its control into a twist, and its name there.
+    pub(crate) fn id(&self) -> (&str, &str) {
+        (&self.jacobian, &self.name)
+    }
+
     /// Returns whether both pass the same filters, gates, schedules and sides of switches.
     pub(super) fn takes_the_way_of(&self, other: &Self) -> bool {
         let filters = |one: &Self| one.filters.iter().map(|filter| filter.node.clone()).collect::<Vec<_>>();

@@ -50,8 +50,7 @@ impl Loop {
         for other in others {
             let other = Feature { beside: Vec::new(), ..other.clone() };
             // One that only moves what does not change the feature adds nothing.
-            let row = answer.row().iter().zip(other.column).map(|(answer, column)| answer * column).sum::<f64>();
-            if row != 0.0 {
+            if answer.along(&other.column) != 0.0 {
                 beside.push(Self::over(&other, contact, period)?);
             }
         }
@@ -60,7 +59,7 @@ impl Loop {
 
     /// Returns the loop of a feature, with the latency and the period [s].
     pub(crate) fn new(feature: &Feature, answer: &Answer, latency: f64, period: f64) -> Self {
-        let gain = answer.row().iter().zip(feature.column).map(|(answer, column)| answer * column).sum();
+        let gain = answer.along(&feature.column);
         let Feature { kp, ki, kd, .. } = *feature;
         let shapes = feature.filters.iter().map(|filter| filter.shape).collect();
         let (resonance, measured, beside) = (answer.resonance(), Vec::new(), Vec::new());

@@ -118,8 +118,7 @@ fn scheduled(feature: &Feature, schedule: &Schedule) -> String {
 fn together(feature: &Feature) -> Option<String> {
     let measured = feature.measured.as_ref().filter(|_| !feature.beside.is_empty())?;
     // Once for all that answer it.
-    let order = |one: &Feature| (one.jacobian.clone(), one.name.clone());
-    if feature.beside.iter().any(|other| order(other) < order(feature)) {
+    if feature.beside.iter().any(|other| other.id() < feature.id()) {
         return None;
     }
     let others: Vec<String> =

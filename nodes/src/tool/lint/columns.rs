@@ -74,10 +74,7 @@ fn is_outweighed(row: &Row, column: &[f64; 6], answer: &Answer) -> bool {
 fn reversed(arm: &Controlled<'_>, mode: &ModeLaw<'_>, feature: &Feature) -> Option<Diagnostic> {
     let quantity = feature.quantity()?;
     let column = mode.column(feature)?;
-    let gain = |contact: &&Contact| {
-        let answer = contact.features.get(quantity)?.row();
-        Some(answer.iter().zip(feature.column).map(|(answer, entry)| answer * entry).sum::<f64>())
-    };
+    let gain = |contact: &&Contact| Some(contact.features.get(quantity)?.along(&feature.column));
     let contact = arm.contacts.iter().find(|contact| gain(contact).is_some_and(|gain| gain < 0.0))?;
     let message = format!(
         "the column of `{}` increases its error over `{}`: there, `contacts` of the bench says how `{quantity}` answers",

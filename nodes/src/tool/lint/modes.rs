@@ -1,5 +1,5 @@
-//! Modes: rolling without force control, a position along a line, and setpoints that a limit or a threshold keeps a task
-//! from.
+//! Modes: rolling without force control, a position along a line, an approach without a motion, and setpoints that a limit
+//! or a threshold keeps a task from.
 
 use std::collections::BTreeSet;
 use std::ops::Range;

@@ -43,10 +43,9 @@ pub(super) fn check(arm: &Controlled<'_>, found: &mut Diagnostics) {
     let mut seen = BTreeSet::new();
     for mode in &arm.modes {
         let period = mode.nodes.period();
-        for feature in
-            mode.moving().filter(|feature| feature.kp > 0.0 && feature.kp * period < DIVERGES && is_largest(feature))
-        {
-            if is_known(mode, feature, contacts) && seen.insert(key(feature)) {
+        for feature in mode.moving().filter(|feature| feature.kp > 0.0 && feature.kp * period < DIVERGES) {
+            let is_judged = is_known(mode, feature, contacts) && is_largest(feature, contacts);
+            if is_judged && seen.insert(key(feature)) {
                 found.extend(judge(mode, feature, contacts));
             }
         }
@@ -55,11 +54,13 @@ pub(super) fn check(arm: &Controlled<'_>, found: &mut Diagnostics) {
 
 /// Returns whether a loop has the largest gain of those that answer its measurement together: the first one of equal
 /// ones. The others have the same margins.
-fn is_largest(feature: &Feature) -> bool {
-    let gain = |one: &Feature| one.kp * one.column.iter().fold(0.0, |most: f64, entry| most.max(entry.abs()));
-    let order = |one: &Feature| (one.jacobian.clone(), one.name.clone());
+fn is_largest(feature: &Feature, contacts: &[Contact]) -> bool {
+    let gain = |one: &Feature| {
+        let answers = contacts.iter().filter_map(|contact| contact.answer(one.quantity()?));
+        answers.map(|answer| (one.kp * answer.along(&one.column)).abs()).fold(0.0, f64::max)
+    };
     feature.beside.iter().all(|other| match gain(feature).total_cmp(&gain(other)) {
-        Ordering::Equal => order(feature) <= order(other),
+        Ordering::Equal => feature.id() <= other.id(),
         found => found == Ordering::Greater,
     })
 }
