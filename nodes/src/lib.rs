@@ -146,6 +146,8 @@ pub fn catalogue() -> Catalogue {
         .node::<servo::follow_path::FollowPath>()
         .node::<servo::follow_surface::FollowSurface>()
         .node::<servo::park::Park>()
+        .node::<servo::arm_spring::ArmSpring>()
+        .node::<servo::arm_damping::ArmDamping>()
         .node::<servo::pivot::Pivot>()
         .node::<servo::twist_adder::TwistAdder>()
         .node::<servo::compose_twist::ComposeTwist>()

@@ -5,6 +5,7 @@ mod absence;
 #[cfg(unix)]
 mod agni;
 mod answers;
+mod arm_spring;
 mod bad_data;
 mod blind;
 mod calibrate;

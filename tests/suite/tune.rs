@@ -11,7 +11,7 @@ use crate::lockstep::Peer;
 use crate::tool::{peer, say};
 
 /// The text of a shipped file, with the files that it names at their own places.
-fn shipped(file: &str) -> String {
+pub(crate) fn shipped(file: &str) -> String {
     let graphs = tactflow_tests::workspace().join("graphs");
     let text = fs::read_to_string(graphs.join(file)).unwrap();
     let text = text.replace("\"../", &format!("\"{}/", graphs.display()));
@@ -138,19 +138,19 @@ fn what_cannot_be_tuned_says_why() {
 fn gains_that_follow_the_measured_travel_are_named_and_not_tuned() {
     // Without the commanded travel, the factor says nothing of the loop.
     let (_folder, path) = in_new_folder("force.toml");
-    let wires = "in.jacobian = \"move.jacobian\"\nin.equilibrium = \"arm.equilibrium\"\nnominal";
+    let wires = "in.jacobian = \"move.jacobian\"\nin.equilibrium = \"arm.equilibrium\"\nin.given_way = \"spring.given_way\"\nnominal";
     let text = shipped("force.toml");
     assert!(text.contains(wires));
     fs::write(&path, text.replace(wires, "nominal")).unwrap();
     assert_eq!(say(&["check", &path]).code, 0);
     let page = say(&["explain", &path]).out;
-    assert!(page.contains("`schedule` multiplies the gains of `pressure` from 0.1 to 2.5, by what this"), "{page}");
+    assert!(page.contains("`schedule` multiplies the gains of `pressure` from 0.1 to 2, by what this"), "{page}");
     assert!(!page.contains("phase margin"), "{page}");
     let said = say(&["tune", &path]);
     assert_eq!(said.code, 2, "{}", said.err);
     assert!(said.err.contains("`schedule` multiplies the gains of `pressure` by what is not known"), "{}", said.err);
     // One of both wires is a mistake in the place of the node.
-    fs::write(&path, text.replace("in.equilibrium = \"arm.equilibrium\"\nnominal", "nominal")).unwrap();
+    fs::write(&path, text.replace("in.equilibrium = \"arm.equilibrium\"\nin.given_way", "in.given_way")).unwrap();
     let said = say(&["check", &path]);
     assert!(said.code == 2 && said.err.contains("needs `equilibrium` beside `jacobian`"), "{}", said.err);
 }

@@ -1,6 +1,8 @@
 //! From features to a twist of the sensor (paper section IV).
 
 pub mod adjoint;
+pub mod arm_damping;
+pub mod arm_spring;
 pub mod compose_twist;
 pub mod deadband;
 pub mod edge_guard;

@@ -7,7 +7,7 @@ use super::super::max_age;
 use super::ceiling::Ceiling;
 use super::ceilings::Ceilings;
 use super::{PadLoad, Params, centre, highest, load};
-use crate::motion::normal::along_z;
+use crate::motion::normal::give;
 
 /// Value of a tactel that counts as touched, as a fraction of its ceiling, if the threshold is not given [1].
 const DEFAULT_THRESHOLD: f64 = 0.01;
@@ -144,7 +144,7 @@ impl Gauge {
         let touches = peak > self.threshold;
         // Before the touch the mass of the arm counts, and not its spring.
         let gives_way = self.joints.zip(arm).filter(|_| touches);
-        let compliance = gives_way.map_or(0.0, |(joints, (pose, jacobian))| joints * gain(pose, jacobian));
+        let compliance = gives_way.map_or(0.0, |(joints, (pose, jacobian))| joints * give(pose, jacobian));
         let pressed = |ceiling: &Ceiling, load: f64, held: f64, place: Place| Pressed {
             load,
             allowed: ceiling.in_series(compliance).allowed_speed(held, delay),
@@ -178,11 +178,4 @@ fn stiffnesses(params: &Params, shape: &ImageShape, ceilings: &Ceilings, delay: 
     let tactel = params.foam_n_per_m3 * shape.pitch[0] * shape.pitch[1];
     let pad = tactel * (shape.rows * shape.cols) as f64;
     [pad, STIFFENING * tactel].map(|foam| params.contact_n_per_m.map_or(foam, |contact| contact.min(foam)))
-}
-
-/// Returns the sum of the squares of how fast the sensor moves along its z for each joint [m²].
-///
-/// A force f along z turns joint i by f J_i / k, and that moves the sensor by J_i times as much.
-fn gain(pose: &Pose, jacobian: &Jacobian) -> f64 {
-    along_z(pose, jacobian).map(|part| part * part).sum()
 }

@@ -2,7 +2,6 @@
 //! on what the controller makes of features that are absent.
 
 mod course;
-mod lead;
 
 use tactflow_runtime::node::{Describe, In, Inputs, Limits, Mistakes, Node, Out, Outputs, Param, Setup, State, Tick};
 use tactflow_runtime::signal::{
@@ -11,10 +10,10 @@ use tactflow_runtime::signal::{
 
 use super::max_age;
 use crate::motion::bounds::countable;
+use crate::motion::normal::lead;
 use crate::usual::USUAL_M_PER_S;
 
 pub use course::{Course, Phase, Times};
-pub use lead::lead;
 
 /// Keeps the motion from pushing into the void when a contact is lost.
 ///

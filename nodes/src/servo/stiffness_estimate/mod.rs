@@ -34,15 +34,19 @@ const FARTHER: f64 = 1.2;
 /// arm gives way too. For the gain of a loop its spring counts as well: wire `jacobian` and `equilibrium`, and z is the
 /// travel that was commanded, n · J dq with the changes dq of the equilibrium and the normal n of the pad.
 ///
-/// **Lag.** Filters, and an arm that swings, delay the feature against the travel, and make the object look softer.
-/// `lag_ms` delays the travel as a low-pass filter does. Add up the delays of the filters, the latency, and for a
-/// commanded travel the delay of the arm, which is 2 ζ / ω for a resonance. With too much lag, the object looks too stiff
-/// at first, which is safe.
+/// An arm that swings is not where it was commanded to be, and a press looks too stiff during the first half of a swing.
+/// Wire `given_way` of `arm_spring` too. While it is known, z is the travel that the arm would have at rest: the measured
+/// travel, and how far the spring gives way.
+///
+/// **Lag.** Filters delay the feature against the travel, and make the object look softer. `lag_ms` delays the travel as
+/// a low-pass filter does: add up the delays of the filters and the latency. For a commanded travel, `arm_lag_ms` comes
+/// on top, the delay of the arm, which is 2 ζ / ω for a resonance. With too much lag, the object looks too stiff at first,
+/// which is safe.
 ///
 /// **An object that moves.** The object must rest while the sensor moves. One that moves by itself changes the feature
-/// without any travel, and an arm that swings after a bounce moves farther than commanded. So with the commanded travel,
-/// an estimate is valid only if the arm has moved in the same direction, and at most a fifth farther. Where a stiff arm
-/// hides the motion of an object, the last estimate stays until the sensor has moved again.
+/// without any travel, and an arm that swings after a bounce moves farther than commanded. So unless `pose` alone is
+/// wired, an estimate is valid only if the arm has moved in the same direction, and at most a fifth farther. Where a
+/// stiff arm hides the motion of an object, the last estimate stays until the sensor has moved again.
 ///
 /// A small `multisine` along z excites a contact that rests. Friction hides small motions: choose `min_travel_m` well
 /// above the travel in which foam and joints stick.
@@ -54,8 +58,10 @@ const FARTHER: f64 = 1.2;
 /// in.pose = "state.sensor_pose"
 /// in.jacobian = "state.jacobian"
 /// in.equilibrium = "arm.equilibrium"
+/// in.given_way = "arm_spring.given_way"
 /// nominal = 10.0                      # 0.01 N per tactel for each mm [N per tactel per m]
-/// lag_ms = 70
+/// lag_ms = 20
+/// arm_lag_ms = 50
 /// ```
 #[derive(Describe)]
 pub struct StiffnessEstimate {
@@ -79,9 +85,12 @@ pub struct Params {
     /// Smallest correlation of the feature and the travel.
     #[param(unit = "1", range = 0.0..=1.0, default = 0.9)]
     min_correlation: f64,
-    /// Delay of the feature against the travel.
+    /// Delay of the feature against the travel, without that of the arm.
     #[param(unit = "ms", range = 0.0.., default = 0.0)]
     lag_ms: f64,
+    /// Delay of the arm against the commanded travel. It does not count while `given_way` is known.
+    #[param(unit = "ms", range = 0.0.., default = 0.0)]
+    arm_lag_ms: f64,
 }
 
 /// What `stiffness_estimate` reads.
@@ -99,6 +108,9 @@ pub struct Inputs<'a> {
     /// Posture that the commands have moved the arm to, for the commanded travel.
     #[port(unit = "rad", robot = "R", quantity = "equilibrium", optional, sampled)]
     equilibrium: Option<In<'a, Joints>>,
+    /// How far the arm gives way to the force, of `arm_spring`.
+    #[port(unit = "m", frame = "A", quantity = "given_way", optional, sampled)]
+    given_way: Option<In<'a, Scalar>>,
 }
 
 /// What `stiffness_estimate` writes.
@@ -166,7 +178,7 @@ impl Node for StiffnessEstimate {
     fn step(&self, tick: &Tick, inputs: Inputs<'_>, out: &mut Outputs, state: &mut State) {
         let value = *inputs.value;
         let measured = state.measured_travel.measured(&inputs.pose);
-        let moved = match inputs.jacobian.zip(inputs.equilibrium) {
+        let commanded = match inputs.jacobian.zip(inputs.equilibrium) {
             Some((jacobian, equilibrium)) => state.travel.commanded(&inputs.pose, &jacobian, &equilibrium),
             // Wired, and absent at this moment: what was commanded is not known.
             None if self.joints > 0 => {
@@ -175,10 +187,14 @@ impl Node for StiffnessEstimate {
             }
             None => measured,
         };
+        let spring = inputs.given_way.map(|given_way| *given_way);
+        let at_rest = state.travel.at_rest(measured, spring);
+        let moved = if spring.is_some() { at_rest } else { commanded };
         match moved.zip(measured).zip(state.interval.step(&inputs.value, tick)) {
             Some(((moved, measured), dt)) => {
                 let decay = libm::exp(-dt / self.params.memory_s);
-                let lag = self.params.lag_ms * 1e-3;
+                let arm = if spring.is_some() || self.joints == 0 { 0.0 } else { self.params.arm_lag_ms };
+                let lag = (self.params.lag_ms + arm) * 1e-3;
                 state.line.add(state.travel.lagging(moved, dt, lag), value, decay);
                 state.measured_line.add(state.measured_travel.lagging(measured, dt, lag), value, decay);
             }

@@ -230,3 +230,34 @@ fn what_the_commanded_travel_needs_is_named() {
     let made = NodeRig::new::<StiffnessEstimate>(NOMINAL, &wires);
     assert_eq!(places(NOMINAL, &made), ["missing-input: `the node`"]);
 }
+
+#[test]
+fn an_arm_that_swings_does_not_hide_what_its_contact_answers() {
+    // A contact of 20 N per tactel and metre; the arm gives way by as much as the sensor moves.
+    let params = format!("{NOMINAL}\narm_lag_ms = 50");
+    let wires: [(&str, Shape); 5] = [
+        ("value", ScalarShape::of(Unit::NEWTON.per_tactel()).into()),
+        ("pose", PoseShape::default().into()),
+        ("jacobian", JacobianShape(joints()).into()),
+        ("equilibrium", joints().into()),
+        ("given_way", ScalarShape::of(Unit::METRE).into()),
+    ];
+    let found = |knows_the_spring: bool| {
+        let mut rig = NodeRig::new::<StiffnessEstimate>(&params, &wires).unwrap();
+        let swing = |i: u32| 0.0008 * libm::sin(0.09 * f64::from(i));
+        (0..18)
+            .map(|i| {
+                let commanded = 1e-4 * f64::from(i);
+                // The sensor is farther than half of the command by its swing.
+                let place = 0.5 * commanded + swing(i);
+                if knows_the_spring {
+                    rig.set("given_way", place);
+                }
+                follow(&mut rig, commanded, place, 20.0 * place).0
+            })
+            .last()
+            .unwrap()
+    };
+    assert!((found(true).unwrap() - 1.0).abs() < 1e-6, "{:?}", found(true));
+    assert!((found(false).unwrap() - 1.0).abs() > 0.1, "{:?}", found(false));
+}

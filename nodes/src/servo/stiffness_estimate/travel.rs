@@ -15,6 +15,8 @@ pub(super) struct Travel {
     equilibrium: Vec<f64>,
     /// Whether that equilibrium is known.
     is_known: bool,
+    /// How far the spring of the arm gave way at the last sample [m], if that is known.
+    given_way: Option<f64>,
     /// The way that is not yet passed on [m]; `None` before the first step.
     behind: Option<f64>,
 }
@@ -22,7 +24,7 @@ pub(super) struct Travel {
 impl Travel {
     /// Nothing is known yet of an arm with so many joints.
     pub(super) fn new(joints: usize) -> Self {
-        Self { position: None, equilibrium: vec![0.0; joints], is_known: false, behind: None }
+        Self { position: None, equilibrium: vec![0.0; joints], is_known: false, given_way: None, behind: None }
     }
 
     /// Returns the measured step since the last sample [m]; `None` for the first one.
@@ -38,6 +40,13 @@ impl Travel {
         let step = along_z(pose, jacobian).zip(moved).map(|(part, moved)| part * moved).sum();
         self.equilibrium.copy_from_slice(&equilibrium.0);
         std::mem::replace(&mut self.is_known, true).then_some(step)
+    }
+
+    /// Returns the step since the last sample that an arm at rest would have made [m], of which `measured` is that of the
+    /// sensor, while its spring gives way by `given_way` [m]; `None` for the first one.
+    pub(super) fn at_rest(&mut self, measured: Option<f64>, given_way: Option<f64>) -> Option<f64> {
+        let last = std::mem::replace(&mut self.given_way, given_way)?;
+        measured.zip(given_way).map(|(measured, given_way)| measured + given_way - last)
     }
 
     /// Forgets the last sample.

@@ -1,0 +1,111 @@
+//! The spring against an arm that is computed here: what it gives way, its swing, and what it learns.
+
+use nalgebra::{IsometryMatrix3, Rotation3, Translation3};
+use tactflow_runtime::harness::NodeRig;
+use tactflow_runtime::signal::{JacobianShape, Joint, JointsShape, PoseShape, Shape, Twist};
+
+use super::learned::{SETTLE_S, SMOOTH_S};
+use super::*;
+
+/// Period of the rig [s], and how far the joint moves the sensor along its z [m/rad].
+const PERIOD: f64 = 0.004;
+const ARM: f64 = 0.6;
+/// Stiffness of the joint [N m/rad], so the compliance along z is 0.36 / 200 = 1.8 mm/N.
+const JOINT: &str = "joint_n_m_per_rad = 200.0";
+const COMPLIANCE: f64 = ARM * ARM / 200.0;
+
+struct Cell(NodeRig);
+
+impl Cell {
+    fn new(params: &str, unit: Unit) -> Self {
+        let joints =
+            JointsShape { joints: vec![Joint { name: "elbow".into(), ..Joint::default() }], unit: Unit::RADIAN };
+        let wires: [(&str, Shape); 5] = [
+            ("force", ScalarShape::of(unit).into()),
+            ("pose", PoseShape::default().into()),
+            ("jacobian", JacobianShape(joints.clone()).into()),
+            ("position", joints.clone().into()),
+            ("equilibrium", joints.into()),
+        ];
+        Self(NodeRig::new::<ArmSpring>(params, &wires).unwrap_or_else(|mistakes| panic!("{mistakes:?}")))
+    }
+
+    /// Steps with a force [N], or without a contact, and with a lead along z [m]. Returns what the arm gives way, and its
+    /// swing [m].
+    fn step(&mut self, force: impl Into<Option<f64>>, lead: f64) -> Option<[f64; 2]> {
+        let rig = &mut self.0;
+        match force.into() {
+            Some(force) => rig.set("force", force),
+            None => rig.lose("force"),
+        }
+        // The sensor looks along the base's -x, at a place that makes the joint move it along its z.
+        let turn = Rotation3::from_euler_angles(0.0, -std::f64::consts::FRAC_PI_2, 0.0);
+        let place = Translation3::new(0.2, 0.0, ARM);
+        rig.set("pose", Pose(IsometryMatrix3::from_parts(place, turn)));
+        // A joint about -y through the base's origin.
+        rig.set("jacobian", Jacobian([Twist([0.0, 0.0, 0.0, 0.0, -1.0, 0.0].into())].into()));
+        rig.set("position", Joints([0.3].into()));
+        rig.set("equilibrium", Joints([0.3 + lead / ARM].into()));
+        rig.step_ms(1e3 * PERIOD);
+        Some([*rig.get::<Scalar>("given_way")?, *rig.get::<Scalar>("swing")?])
+    }
+}
+
+#[test]
+fn an_arm_at_rest_gives_way_by_its_compliance_and_does_not_swing() {
+    let mut cell = Cell::new(JOINT, Unit::NEWTON);
+    for i in 0..500 {
+        let force = 0.01 * f64::from(i);
+        let [given_way, swing] = cell.step(force, COMPLIANCE * force).unwrap();
+        assert!((given_way - COMPLIANCE * force).abs() < 1e-7, "{i}: {given_way}");
+        assert!(swing.abs() < 1e-6, "{i}: {swing}");
+    }
+}
+
+#[test]
+fn a_lead_without_a_force_is_a_swing_and_what_stays_is_none() {
+    let mut cell = Cell::new(JOINT, Unit::NEWTON);
+    (0..100).for_each(|_| assert!(cell.step(2.0, 0.005).unwrap()[1].abs() < 1e-9, "where the contact begins"));
+    // 2.4 Hz pass: the filters take 1 / (1 + 1 / (w T)²) and 1 / (1 + (w t)²) of the power.
+    let omega = 15.0_f64;
+    let swings: Vec<f64> = (0..2000)
+        .map(|i| cell.step(2.0, 0.005 + 0.001 * libm::sin(omega * PERIOD * f64::from(i))).unwrap()[1])
+        .collect();
+    let most = swings[1500..].iter().fold(0.0, |most: f64, swing| most.max(swing.abs()));
+    let passes = 1.0 / (1.0 + (omega * SETTLE_S).powi(-2)).sqrt() / (1.0 + (omega * SMOOTH_S).powi(2)).sqrt();
+    assert!((most / (0.001 * passes) - 1.0).abs() < 0.03, "{most} of {}", 0.001 * passes);
+    let stays = (0..500).map(|_| cell.step(2.0, 0.008).unwrap()[1]).last().unwrap();
+    assert!(stays.abs() < 0.0003, "of 3 mm of friction, less than a tenth is a swing after 2 s: {stays}");
+}
+
+#[test]
+fn the_true_compliance_is_learned_up_to_a_factor_of_three_and_stays_after_the_contact() {
+    for (times, learned) in [(0.5, 0.5), (2.0, 2.0), (10.0, 3.0), (-1.0, 1.0 / 3.0)] {
+        let mut cell = Cell::new(JOINT, Unit::NEWTON);
+        let press = |cell: &mut Cell| {
+            let force = |i: u32| 3.0 - 3.0 * libm::exp(-0.02 * f64::from(i));
+            (0..3000).map(|i| cell.step(force(i), times * COMPLIANCE * force(i)).unwrap()[0]).last().unwrap()
+        };
+        let found = press(&mut cell) / (3.0 * COMPLIANCE);
+        assert!((found / learned - 1.0).abs() < 0.1, "{times}: {found}");
+        assert_eq!(cell.step(None, 0.0), None, "without a contact");
+        let again = cell.step(3.0, 0.0).unwrap()[0] / (3.0 * COMPLIANCE);
+        assert!((again / found - 1.0).abs() < 0.02, "{times}: {again} after {found}");
+    }
+}
+
+#[test]
+fn a_stiff_arm_and_a_pad_without_newtons_say_nothing() {
+    assert_eq!(Cell::new("", Unit::NEWTON).step(2.0, 0.01), None);
+    assert_eq!(Cell::new(JOINT, Unit::RAW).step(2.0, 0.01), None);
+}
+
+#[test]
+fn what_is_not_a_number_is_forgotten() {
+    let mut cell = Cell::new(JOINT, Unit::NEWTON);
+    assert!(cell.step(2.0, 0.004).is_some());
+    assert_eq!(cell.step(f64::NAN, 0.004), None);
+    assert_eq!(cell.step(2.0, f64::NAN), None);
+    let [given_way, swing] = cell.step(2.0, 0.004).unwrap();
+    assert!((given_way / (2.0 * COMPLIANCE) - 1.0).abs() < 0.02 && swing == 0.0);
+}
