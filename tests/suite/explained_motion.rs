@@ -179,13 +179,16 @@ fn the_bandwidth_of_a_flat_response_lies_in_its_range() {
 #[test]
 fn the_estimate_of_a_run_is_near_what_the_bench_states() {
     // A soft ball touches more tactels the further it is pressed, so its last bit of a press answers less than the whole.
-    for (bench, most) in [("ball", 0.45), ("pen", 0.1), ("toy_box", 0.1)] {
+    for (bench, off) in [("ball", 0.2..0.45), ("pen", -0.1..0.1), ("toy_box", -0.1..0.1)] {
         let file = format!("graphs/benches/{bench}.toml");
         let stated: toml::Table = toml::from_str(&fs::read_to_string(workspace().join(&file)).unwrap()).unwrap();
         let stated = stated["facts"]["arm"]["contacts"][0]["pressure"]["vz"].as_float().unwrap();
         let rows = recorded(&["graphs/force.toml", "--bench", &file], "6s");
         let estimate = 10.0 * rows[rows.len() - 1]["stiffness.ratio"];
-        assert!((estimate / stated - 1.0).abs() < most, "{bench}: {estimate}, stated {stated} N per tactel and metre");
+        assert!(
+            off.contains(&(estimate / stated - 1.0)),
+            "{bench}: {estimate}, stated {stated} N per tactel and metre"
+        );
     }
 }
 

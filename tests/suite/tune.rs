@@ -138,7 +138,7 @@ fn what_cannot_be_tuned_says_why() {
 fn gains_that_follow_the_measured_travel_are_named_and_not_tuned() {
     // Without the commanded travel, the factor says nothing of the loop.
     let (_folder, path) = in_new_folder("force.toml");
-    let wires = "in.jacobian = \"move.jacobian\"\nin.equilibrium = \"arm.equilibrium\"\nin.given_way = \"spring.given_way\"\nnominal";
+    let wires = "in.jacobian = \"move.jacobian\"\nin.equilibrium = \"arm.equilibrium\"\nin.deflection = \"spring.deflection\"\nnominal";
     let text = shipped("force.toml");
     assert!(text.contains(wires));
     fs::write(&path, text.replace(wires, "nominal")).unwrap();
@@ -150,7 +150,7 @@ fn gains_that_follow_the_measured_travel_are_named_and_not_tuned() {
     assert_eq!(said.code, 2, "{}", said.err);
     assert!(said.err.contains("`schedule` multiplies the gains of `pressure` by what is not known"), "{}", said.err);
     // One of both wires is a mistake in the place of the node.
-    fs::write(&path, text.replace("in.equilibrium = \"arm.equilibrium\"\nin.given_way", "in.given_way")).unwrap();
+    fs::write(&path, text.replace("in.equilibrium = \"arm.equilibrium\"\nin.deflection", "in.deflection")).unwrap();
     let said = say(&["check", &path]);
     assert!(said.code == 2 && said.err.contains("needs `equilibrium` beside `jacobian`"), "{}", said.err);
 }

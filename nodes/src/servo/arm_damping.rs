@@ -15,14 +15,18 @@ use crate::usual::USUAL_M_PER_S;
 /// vz = wanted vz - rate · (swing beyond within_m)
 /// ```
 ///
-/// With the resonance ω of arm and contact, and the damping ratio ζ, a large swing decays as if 2 ζ ω were larger by `rate`.
-/// A `rate` below 2 ζ ω cannot make the arm unstable, whatever the delays are: then less than the whole swing comes back
-/// around the loop (small-gain theorem). A swing of less than `within_m` is left alone, because friction of the joints looks
-/// like one: it bends the springs while they turn.
+/// With the resonance ω of arm and contact, and the damping ratio ζ, a large swing decays as if 2 ζ ω were larger by `rate`,
+/// if nothing is late. A swing of less than `within_m` is left alone, because friction of the joints looks like one: it
+/// bends the springs while they turn.
+///
+/// If the stiffness of `arm_spring` is right, a `rate` below 2 ζ ω / √(1 + 4 ζ²) cannot make this loop unstable, however
+/// late samples and commands are (small-gain theorem). The default of 6 1/s is more than that for an arm with little damping:
+/// it is right for samples and commands that are 12 ms late at most.
 ///
 /// While the swing is absent, the motion passes unchanged. The swing ends with the contact, and then the motion jumps by at
-/// most `max_m_per_s`, so a `bumpless` stands behind this node. For motions that slide or roll along an object, leave it
-/// out: forces that the pad does not measure bend the springs as well.
+/// most `max_m_per_s`, so a `bumpless` stands behind this node. It damps whenever something touches the pad and a motion is
+/// wanted, also in a mode that selects no component. For motions that slide or roll along an object, leave it out: forces
+/// that the pad does not measure bend the springs as well.
 ///
 /// Source: feedback of the torque of springs to damp a load (Hori, Sawada and Chun, Slow resonance ratio control, IEEE
 /// Transactions on Industrial Electronics 46, 1999), with the force on the pad for the torque of the load.

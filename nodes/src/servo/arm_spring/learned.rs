@@ -6,19 +6,23 @@ use tactflow_runtime::node::State;
 pub(super) const SETTLE_S: f64 = 0.3;
 /// Time constant of the low-pass filter [s].
 pub(super) const SMOOTH_S: f64 = 0.02;
-/// Time in which the weight of a sample decays to 37 % [s].
+/// Time of contact in which the weight of a sample decays to 37 %, and that of what is stated [s].
 const MEMORY_S: f64 = 2.0;
-/// Weight of the stated compliance, as the square of a force times the time for which it acts [N² s].
+/// Weight of the stated compliance at first, as the square of a force times the time for which it acts [N² s].
 const STATED: f64 = 1.0;
+/// Its weight in the end: without a force, there is nothing to learn [N² s].
+const STATED_AT_LEAST: f64 = 0.01;
 /// How many times as much or as little as stated the compliance may be [1].
 const MOST: f64 = 3.0;
 
 /// What is known of the spring of an arm.
 #[derive(Debug, State)]
-pub struct Spring {
-    /// Sum of lead times force, of samples with decaying weights [m N s].
+pub(super) struct Spring {
+    /// Weight of the stated compliance; `None` before the first contact [N² s].
+    stated: Option<f64>,
+    /// Sum of the lead times the deflection that is stated, of samples with decaying weights [m² s].
     products: f64,
-    /// Sum of the squares of the force, of the same samples [N² s].
+    /// Sum of the squares of the deflection that is stated, of the same samples [m² s].
     squares: f64,
     /// The contact, while there is one.
     contact: Option<Contact>,
@@ -38,26 +42,35 @@ struct Contact {
 /// How the spring of an arm is bent.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Bent {
-    /// How far it gives way to the force [m].
-    pub(super) given_way: f64,
-    /// What of the lead is a swing [m].
+    /// By the force [m].
+    pub(super) deflection: f64,
+    /// By a swing [m].
     pub(super) swing: f64,
+}
+
+impl Bent {
+    /// Whether both are numbers.
+    pub(super) const fn is_finite(self) -> bool {
+        self.deflection.is_finite() && self.swing.is_finite()
+    }
 }
 
 impl Spring {
     /// Takes the next lead [m] and force [N], `dt` [s] after the last ones, of an arm with this stated compliance [m/N].
-    pub(super) fn next(&mut self, stated: f64, lead: f64, force: f64, dt: f64) -> Bent {
-        let begun = || Contact { rest: lead - self.compliance(stated) * force, stayed: 0.0, swing: 0.0 };
+    pub(super) fn next(&mut self, compliance: f64, lead: f64, force: f64, dt: f64) -> Bent {
+        let stated = compliance * force;
+        let begun = || Contact { rest: lead - self.factor(compliance) * stated, stayed: 0.0, swing: 0.0 };
         let mut contact = self.contact.unwrap_or_else(begun);
         let lead = lead - contact.rest;
         let kept = 1.0 - share(dt, MEMORY_S);
-        self.products = kept * self.products + lead * force * dt;
-        self.squares = kept * self.squares + force * force * dt;
-        let given_way = self.compliance(stated) * force;
-        contact.stayed += (lead - given_way - contact.stayed) * share(dt, SETTLE_S);
-        contact.swing += (lead - given_way - contact.stayed - contact.swing) * share(dt, SMOOTH_S);
+        self.stated = Some((kept * self.stated.unwrap_or(STATED)).max(STATED_AT_LEAST));
+        self.products = kept * self.products + lead * stated * dt;
+        self.squares = kept * self.squares + stated * stated * dt;
+        let deflection = self.factor(compliance) * stated;
+        contact.stayed += (lead - deflection - contact.stayed) * share(dt, SETTLE_S);
+        contact.swing += (lead - deflection - contact.stayed - contact.swing) * share(dt, SMOOTH_S);
         self.contact = Some(contact);
-        Bent { given_way, swing: contact.swing }
+        Bent { deflection, swing: contact.swing }
     }
 
     /// The contact ends. What has been learned of the spring stays.
@@ -65,14 +78,11 @@ impl Spring {
         self.contact = None;
     }
 
-    /// Whether what was learned is finite: a sample that is not a number would stay in it.
-    pub(super) fn is_finite(&self) -> bool {
-        self.products.is_finite() && self.squares.is_finite()
-    }
-
-    fn compliance(&self, stated: f64) -> f64 {
-        let learned = (STATED * stated + self.products) / (STATED + self.squares);
-        learned.clamp(stated / MOST, stated * MOST)
+    /// Returns how many times as much as stated the arm gives way. One that the force cannot bend gives way as stated.
+    fn factor(&self, compliance: f64) -> f64 {
+        let weight = self.stated.unwrap_or(STATED) * compliance * compliance;
+        let whole = weight + self.squares;
+        if whole > 0.0 { ((weight + self.products) / whole).clamp(1.0 / MOST, MOST) } else { 1.0 }
     }
 }
 

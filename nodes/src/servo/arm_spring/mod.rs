@@ -1,35 +1,37 @@
-//! `arm_spring`: how far a compliant arm gives way to what it presses on, and how it swings.
+//! `arm_spring`: how far the force on its pad bends the spring of a compliant arm, and how the arm swings.
 
 mod learned;
 
-use tactflow_runtime::node::{Describe, In, Inputs, Mistakes, Node, Out, Outputs, Param, Setup, Tick};
+use tactflow_runtime::node::{Describe, In, Inputs, Interval, Mistakes, Node, Out, Outputs, Param, Setup, State, Tick};
 use tactflow_runtime::signal::{Jacobian, Joints, Pose, Scalar, ScalarShape, Unit};
 
 use crate::motion::normal::{give, lead};
 
 use learned::Spring;
 
-/// Measures how far the spring of a compliant arm gives way to the force on its pad, and how it swings.
+/// Measures how far the force on its pad bends the spring of a compliant arm, and how the arm swings.
 ///
 /// An arm with springs in its joints leads: its commanded equilibrium z_eq is ahead of its position z. With its mass m,
 /// its stiffness K and its damping d along the sensor's z, and with the force F on the pad, m z'' = K (z_eq - z) - d z' - F.
 /// So the lead has two parts:
 ///
 /// ```text
-/// given_way = F / K                                  how far the arm would lean at rest
-/// swing     = (z_eq - z) - F / K = (m z'' + d z') / K
+/// deflection = F / K                                  how far the spring is bent at rest
+/// swing      = (z_eq - z) - F / K = (m z'' + d z') / K
 /// ```
 ///
-/// The lead is n · J (equilibrium - position) with the normal n of the pad. `swing` is filtered: what stays for longer than
-/// 0.3 s is friction of the joints or their weight, and a low-pass filter of 20 ms removes noise.
+/// The lead is n · J (equilibrium - position) with the normal n of the pad. Friction of the joints and their weight bend the
+/// spring too. So the lead counts from where the contact began, and what stays in the swing for longer than 0.3 s is
+/// removed. A low-pass filter of 20 ms removes noise.
 ///
-/// **The compliance 1/K is learned.** It begins with that of the joints, J k⁻¹ Jᵀ along the normal. Then it is the slope of
-/// the lead over the force, by least squares over the last 2 s of contact. What is stated counts as much as a second with
-/// 1 N, and at most a factor of three is learned. So a pad that measures half of the force, or an arm that is stiffer than
-/// stated, is wrong in the first press only. What is learned stays when the contact ends.
+/// **The compliance 1/K is learned.** It begins with that of the joints, J k⁻¹ Jᵀ along the normal in the posture of the
+/// arm. Then a factor on it is fitted to lead and force, by least squares over the last 2 s of contact. The factor is
+/// between 1/3 and 3. What is stated counts as much as a second with 1 N at first, and less with each second of contact. So
+/// a wrong stiffness matters in the first press alone: with 3 N for a second, with 0.3 N for some seconds. The factor stays
+/// when the contact ends.
 ///
-/// Both outputs are absent while an input is, so while nothing touches the pad. They are absent too for an arm without
-/// `joint_n_m_per_rad`, which is stiff, and for a force that is not in N.
+/// Both outputs are absent while an input is absent. So they are absent while nothing touches the pad. They are also absent
+/// while all commands are held, for an arm without `joint_n_m_per_rad`, which is stiff, and for a force that is not in N.
 ///
 /// ```toml
 /// [nodes.arm_spring]
@@ -42,7 +44,6 @@ use learned::Spring;
 /// joint_n_m_per_rad = 200.0
 /// ```
 #[derive(Describe)]
-#[describe(every_tick)]
 pub struct ArmSpring {
     /// Compliance of the joints [rad/(N m)]; `None` for a stiff arm, or a force that is not in N.
     compliance: Option<f64>,
@@ -61,7 +62,7 @@ pub struct Params {
 #[derive(Inputs)]
 pub struct Inputs<'a> {
     /// Force on the pad.
-    #[port(unit = "_", frame = "A", sampled)]
+    #[port(unit = "_", frame = "A")]
     force: Option<In<'a, Scalar>>,
     /// Pose of the sensor in the base.
     #[port(frame = "A", reference = "B", quantity = "sensor_pose", known, sampled)]
@@ -80,39 +81,49 @@ pub struct Inputs<'a> {
 /// What `arm_spring` writes.
 #[derive(Outputs)]
 pub struct Outputs {
-    /// How far the arm gives way to the force along the sensor's z.
-    #[port(unit = "m", frame = "A", quantity = "given_way")]
-    given_way: Out<Scalar>,
+    /// How far the force bends the spring of the arm, along the sensor's z.
+    #[port(unit = "m", frame = "A", quantity = "deflection")]
+    deflection: Out<Scalar>,
     /// How far the arm swings along the sensor's z: its lead beyond what the force explains.
     #[port(unit = "m", frame = "A", quantity = "swing")]
     swing: Out<Scalar>,
+}
+
+/// What `arm_spring` remembers.
+#[derive(State)]
+pub struct State {
+    spring: Spring,
+    /// Since the last force.
+    interval: Interval,
 }
 
 impl Node for ArmSpring {
     type Params = Params;
     type Inputs<'a> = Inputs<'a>;
     type Outputs = Outputs;
-    type State = Spring;
+    type State = State;
 
     fn new(params: Params, setup: &mut Setup<Self>) -> Result<Self, Mistakes> {
         let is_in_newtons = setup.inputs.force.as_ref().is_some_and(|force: &ScalarShape| force.unit == Unit::NEWTON);
         let compliance = params.joint_n_m_per_rad.filter(|_| is_in_newtons).map(f64::recip);
-        (setup.outputs.given_way, setup.outputs.swing) = (ScalarShape::of(Unit::METRE), ScalarShape::of(Unit::METRE));
+        (setup.outputs.deflection, setup.outputs.swing) = (ScalarShape::of(Unit::METRE), ScalarShape::of(Unit::METRE));
         Ok(Self { compliance })
     }
 
-    fn step(&self, tick: &Tick, inputs: Inputs<'_>, out: &mut Outputs, state: &mut Spring) {
-        let pressed = self.compliance.zip(pressed(&inputs));
+    fn step(&self, tick: &Tick, inputs: Inputs<'_>, out: &mut Outputs, state: &mut State) {
+        let pressed = self.compliance.zip(pressed(&inputs)).filter(|_| !tick.is_halted);
         let Some((compliance, [give, lead, force])) = pressed else {
-            state.release();
+            state.spring.release();
             return;
         };
-        let bent = state.next(compliance * give, lead, force, tick.dt.min(tick.max_gap));
-        if !state.is_finite() {
+        let dt = inputs.force.and_then(|force| state.interval.step(&force, tick)).unwrap_or(0.0);
+        let bent = state.spring.next(compliance * give, lead, force, dt.min(tick.max_gap));
+        if !bent.is_finite() {
+            // A sample that is not a number would stay in the sums.
             *state = self.state();
             return;
         }
-        out.given_way.set(bent.given_way);
+        out.deflection.set(bent.deflection);
         out.swing.set(bent.swing);
     }
 }

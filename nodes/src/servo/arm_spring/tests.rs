@@ -14,7 +14,11 @@ const ARM: f64 = 0.6;
 const JOINT: &str = "joint_n_m_per_rad = 200.0";
 const COMPLIANCE: f64 = ARM * ARM / 200.0;
 
-struct Cell(NodeRig);
+struct Cell {
+    rig: NodeRig,
+    /// How far the joint moves the sensor along its z [m/rad].
+    arm: f64,
+}
 
 impl Cell {
     fn new(params: &str, unit: Unit) -> Self {
@@ -27,27 +31,28 @@ impl Cell {
             ("position", joints.clone().into()),
             ("equilibrium", joints.into()),
         ];
-        Self(NodeRig::new::<ArmSpring>(params, &wires).unwrap_or_else(|mistakes| panic!("{mistakes:?}")))
+        let rig = NodeRig::new::<ArmSpring>(params, &wires).unwrap_or_else(|mistakes| panic!("{mistakes:?}"));
+        Self { rig, arm: ARM }
     }
 
     /// Steps with a force [N], or without a contact, and with a lead along z [m]. Returns what the arm gives way, and its
     /// swing [m].
     fn step(&mut self, force: impl Into<Option<f64>>, lead: f64) -> Option<[f64; 2]> {
-        let rig = &mut self.0;
+        let Self { rig, arm } = self;
         match force.into() {
             Some(force) => rig.set("force", force),
             None => rig.lose("force"),
         }
         // The sensor looks along the base's -x, at a place that makes the joint move it along its z.
         let turn = Rotation3::from_euler_angles(0.0, -std::f64::consts::FRAC_PI_2, 0.0);
-        let place = Translation3::new(0.2, 0.0, ARM);
+        let place = Translation3::new(0.2, 0.0, *arm);
         rig.set("pose", Pose(IsometryMatrix3::from_parts(place, turn)));
         // A joint about -y through the base's origin.
         rig.set("jacobian", Jacobian([Twist([0.0, 0.0, 0.0, 0.0, -1.0, 0.0].into())].into()));
         rig.set("position", Joints([0.3].into()));
-        rig.set("equilibrium", Joints([0.3 + lead / ARM].into()));
+        rig.set("equilibrium", Joints([0.3 + if *arm == 0.0 { 0.0 } else { lead / *arm }].into()));
         rig.step_ms(1e3 * PERIOD);
-        Some([*rig.get::<Scalar>("given_way")?, *rig.get::<Scalar>("swing")?])
+        Some([*rig.get::<Scalar>("deflection")?, *rig.get::<Scalar>("swing")?])
     }
 }
 
@@ -56,8 +61,8 @@ fn an_arm_at_rest_gives_way_by_its_compliance_and_does_not_swing() {
     let mut cell = Cell::new(JOINT, Unit::NEWTON);
     for i in 0..500 {
         let force = 0.01 * f64::from(i);
-        let [given_way, swing] = cell.step(force, COMPLIANCE * force).unwrap();
-        assert!((given_way - COMPLIANCE * force).abs() < 1e-7, "{i}: {given_way}");
+        let [deflection, swing] = cell.step(force, COMPLIANCE * force).unwrap();
+        assert!((deflection - COMPLIANCE * force).abs() < 1e-7, "{i}: {deflection}");
         assert!(swing.abs() < 1e-6, "{i}: {swing}");
     }
 }
@@ -106,6 +111,55 @@ fn what_is_not_a_number_is_forgotten() {
     assert!(cell.step(2.0, 0.004).is_some());
     assert_eq!(cell.step(f64::NAN, 0.004), None);
     assert_eq!(cell.step(2.0, f64::NAN), None);
-    let [given_way, swing] = cell.step(2.0, 0.004).unwrap();
-    assert!((given_way / (2.0 * COMPLIANCE) - 1.0).abs() < 0.02 && swing == 0.0);
+    let [deflection, swing] = cell.step(2.0, 0.004).unwrap();
+    assert!((deflection / (2.0 * COMPLIANCE) - 1.0).abs() < 0.02 && swing == 0.0);
+}
+
+#[test]
+fn a_light_press_teaches_too_but_later() {
+    let mut cell = Cell::new(JOINT, Unit::NEWTON);
+    let mut factor =
+        |_: u32| cell.step(0.3, COMPLIANCE * 0.3 * 0.5).map(|[deflection, _]| deflection / (0.3 * COMPLIANCE));
+    // The contact begins with a lead that 0.3 N explain, so the factor stays.
+    assert!((0..5000).filter_map(&mut factor).all(|factor| (factor - 1.0).abs() < 1e-6));
+    let mut cell = Cell::new(JOINT, Unit::NEWTON);
+    let mut press = |i: u32| {
+        let force = 0.3 - 0.3 * libm::exp(-0.02 * f64::from(i));
+        cell.step(force, 0.5 * COMPLIANCE * force).unwrap()[0] / (0.3 * COMPLIANCE)
+    };
+    let found: Vec<f64> = (0..2500).map(&mut press).collect();
+    assert!(found[250] > 0.9 && found[2499] < 0.6, "{} and {}", found[250], found[2499]);
+}
+
+#[test]
+fn what_was_learned_holds_in_another_posture() {
+    let mut cell = Cell::new(JOINT, Unit::NEWTON);
+    let force = |i: u32| 3.0 - 3.0 * libm::exp(-0.02 * f64::from(i));
+    for i in 0..3000 {
+        cell.step(force(i), 2.0 * COMPLIANCE * force(i));
+    }
+    cell.step(None, 0.0);
+    cell.arm = 0.3;
+    let [deflection, _] = cell.step(3.0, 0.0).unwrap();
+    assert!((deflection / (3.0 * COMPLIANCE) - 0.5).abs() < 0.03, "twice a quarter of the compliance: {deflection}");
+}
+
+#[test]
+fn an_arm_that_the_force_cannot_bend_gives_way_by_nothing() {
+    let mut cell = Cell::new(JOINT, Unit::NEWTON);
+    cell.arm = 0.0;
+    let [deflection, swing] = cell.step(2.0, 0.0).unwrap();
+    assert!(deflection.abs() < 1e-12 && swing == 0.0, "{deflection}, {swing}");
+    cell.arm = ARM;
+    assert!((cell.step(2.0, 0.0).unwrap()[0] / (2.0 * COMPLIANCE) - 1.0).abs() < 1e-9);
+}
+
+#[test]
+fn between_two_forces_nothing_swings() {
+    let mut cell = Cell::new(JOINT, Unit::NEWTON);
+    let before = cell.step(2.0, 0.004).unwrap();
+    // The lead moves on while the pad is silent.
+    cell.rig.set("equilibrium", Joints([0.4].into()));
+    cell.rig.step_ms(1e3 * PERIOD);
+    assert_eq!(cell.rig.get::<Scalar>("swing"), Some(&before[1]));
 }

@@ -35,8 +35,8 @@ const FARTHER: f64 = 1.2;
 /// travel that was commanded, n · J dq with the changes dq of the equilibrium and the normal n of the pad.
 ///
 /// An arm that swings is not where it was commanded to be, and a press looks too stiff during the first half of a swing.
-/// Wire `given_way` of `arm_spring` too. While it is known, z is the travel that the arm would have at rest: the measured
-/// travel, and how far the spring gives way.
+/// Wire `deflection` of `arm_spring` too. While it is known, z is the travel that the arm would have at rest: the measured
+/// travel, and the deflection of the arm's spring.
 ///
 /// **Lag.** Filters delay the feature against the travel, and make the object look softer. `lag_ms` delays the travel as
 /// a low-pass filter does: add up the delays of the filters and the latency. For a commanded travel, `arm_lag_ms` comes
@@ -58,7 +58,7 @@ const FARTHER: f64 = 1.2;
 /// in.pose = "state.sensor_pose"
 /// in.jacobian = "state.jacobian"
 /// in.equilibrium = "arm.equilibrium"
-/// in.given_way = "arm_spring.given_way"
+/// in.deflection = "arm_spring.deflection"
 /// nominal = 10.0                      # 0.01 N per tactel for each mm [N per tactel per m]
 /// lag_ms = 20
 /// arm_lag_ms = 50
@@ -88,7 +88,7 @@ pub struct Params {
     /// Delay of the feature against the travel, without that of the arm.
     #[param(unit = "ms", range = 0.0.., default = 0.0)]
     lag_ms: f64,
-    /// Delay of the arm against the commanded travel. It does not count while `given_way` is known.
+    /// Delay of the arm against the commanded travel. It does not count while `deflection` is known.
     #[param(unit = "ms", range = 0.0.., default = 0.0)]
     arm_lag_ms: f64,
 }
@@ -108,9 +108,9 @@ pub struct Inputs<'a> {
     /// Posture that the commands have moved the arm to, for the commanded travel.
     #[port(unit = "rad", robot = "R", quantity = "equilibrium", optional, sampled)]
     equilibrium: Option<In<'a, Joints>>,
-    /// How far the arm gives way to the force, of `arm_spring`.
-    #[port(unit = "m", frame = "A", quantity = "given_way", optional, sampled)]
-    given_way: Option<In<'a, Scalar>>,
+    /// How far the force bends the spring of the arm, of `arm_spring`.
+    #[port(unit = "m", frame = "A", quantity = "deflection", optional, sampled)]
+    deflection: Option<In<'a, Scalar>>,
 }
 
 /// What `stiffness_estimate` writes.
@@ -131,6 +131,8 @@ pub struct State {
     /// The feature over the measured travel, where the commanded one counts.
     measured_line: Line,
     measured_travel: Travel,
+    /// Whether the last travel was that of an arm at rest.
+    is_at_rest: bool,
     /// Since the last sample.
     interval: Interval,
     /// The last valid ratio.
@@ -160,6 +162,11 @@ impl Node for StiffnessEstimate {
             let help = format!("wire `in.{missing}` too, or remove `in.{other}` for the measured travel");
             return Err(Mistake::new(Code::MissingInput, At::Node, message).help(help).into());
         }
+        if setup.inputs.deflection.is_some() && setup.inputs.equilibrium.is_none() {
+            let message = "`deflection` needs `jacobian` and `equilibrium`, for the times at which it is not known";
+            let help = "wire `in.jacobian` and `in.equilibrium` too, or remove `in.deflection` for the measured travel";
+            return Err(Mistake::new(Code::MissingInput, At::Node, message).help(help).into());
+        }
         let joints = setup.inputs.equilibrium.as_ref().map_or(0, |shape| shape.joints.len());
         Ok(Self { params, joints })
     }
@@ -170,6 +177,7 @@ impl Node for StiffnessEstimate {
             travel: Travel::new(self.joints),
             measured_line: Line::default(),
             measured_travel: Travel::new(0),
+            is_at_rest: false,
             interval: Interval::default(),
             ratio: None,
         }
@@ -187,8 +195,12 @@ impl Node for StiffnessEstimate {
             }
             None => measured,
         };
-        let spring = inputs.given_way.map(|given_way| *given_way);
+        let spring = inputs.deflection.map(|deflection| *deflection);
         let at_rest = state.travel.at_rest(measured, spring);
+        if std::mem::replace(&mut state.is_at_rest, spring.is_some()) != spring.is_some() {
+            // Another travel, with another lag.
+            state.begin(Line::default());
+        }
         let moved = if spring.is_some() { at_rest } else { commanded };
         match moved.zip(measured).zip(state.interval.step(&inputs.value, tick)) {
             Some(((moved, measured), dt)) => {

@@ -229,6 +229,11 @@ fn what_the_commanded_travel_needs_is_named() {
     let wires = [("value", value), ("pose", PoseShape::default().into()), ("equilibrium", joints().into())];
     let made = NodeRig::new::<StiffnessEstimate>(NOMINAL, &wires);
     assert_eq!(places(NOMINAL, &made), ["missing-input: `the node`"]);
+    let value = ScalarShape::of(Unit::NEWTON.per_tactel()).into();
+    let deflection = ScalarShape::of(Unit::METRE).into();
+    let wires = [("value", value), ("pose", PoseShape::default().into()), ("deflection", deflection)];
+    let made = NodeRig::new::<StiffnessEstimate>(NOMINAL, &wires);
+    assert_eq!(places(NOMINAL, &made), ["missing-input: `the node`"]);
 }
 
 #[test]
@@ -240,7 +245,7 @@ fn an_arm_that_swings_does_not_hide_what_its_contact_answers() {
         ("pose", PoseShape::default().into()),
         ("jacobian", JacobianShape(joints()).into()),
         ("equilibrium", joints().into()),
-        ("given_way", ScalarShape::of(Unit::METRE).into()),
+        ("deflection", ScalarShape::of(Unit::METRE).into()),
     ];
     let found = |knows_the_spring: bool| {
         let mut rig = NodeRig::new::<StiffnessEstimate>(&params, &wires).unwrap();
@@ -251,7 +256,7 @@ fn an_arm_that_swings_does_not_hide_what_its_contact_answers() {
                 // The sensor is farther than half of the command by its swing.
                 let place = 0.5 * commanded + swing(i);
                 if knows_the_spring {
-                    rig.set("given_way", place);
+                    rig.set("deflection", place);
                 }
                 follow(&mut rig, commanded, place, 20.0 * place).0
             })
@@ -259,5 +264,5 @@ fn an_arm_that_swings_does_not_hide_what_its_contact_answers() {
             .unwrap()
     };
     assert!((found(true).unwrap() - 1.0).abs() < 1e-6, "{:?}", found(true));
-    assert!((found(false).unwrap() - 1.0).abs() > 0.1, "{:?}", found(false));
+    assert!(found(false).unwrap() > 1.1, "{:?}", found(false));
 }

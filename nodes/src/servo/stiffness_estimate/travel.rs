@@ -16,7 +16,7 @@ pub(super) struct Travel {
     /// Whether that equilibrium is known.
     is_known: bool,
     /// How far the spring of the arm gave way at the last sample [m], if that is known.
-    given_way: Option<f64>,
+    deflection: Option<f64>,
     /// The way that is not yet passed on [m]; `None` before the first step.
     behind: Option<f64>,
 }
@@ -24,7 +24,7 @@ pub(super) struct Travel {
 impl Travel {
     /// Nothing is known yet of an arm with so many joints.
     pub(super) fn new(joints: usize) -> Self {
-        Self { position: None, equilibrium: vec![0.0; joints], is_known: false, given_way: None, behind: None }
+        Self { position: None, equilibrium: vec![0.0; joints], is_known: false, deflection: None, behind: None }
     }
 
     /// Returns the measured step since the last sample [m]; `None` for the first one.
@@ -43,10 +43,10 @@ impl Travel {
     }
 
     /// Returns the step since the last sample that an arm at rest would have made [m], of which `measured` is that of the
-    /// sensor, while its spring gives way by `given_way` [m]; `None` for the first one.
-    pub(super) fn at_rest(&mut self, measured: Option<f64>, given_way: Option<f64>) -> Option<f64> {
-        let last = std::mem::replace(&mut self.given_way, given_way)?;
-        measured.zip(given_way).map(|(measured, given_way)| measured + given_way - last)
+    /// sensor, while its spring gives way by `deflection` [m]; `None` for the first one.
+    pub(super) fn at_rest(&mut self, measured: Option<f64>, deflection: Option<f64>) -> Option<f64> {
+        let last = std::mem::replace(&mut self.deflection, deflection)?;
+        measured.zip(deflection).map(|(measured, deflection)| measured + deflection - last)
     }
 
     /// Forgets the last sample.
