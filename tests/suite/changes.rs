@@ -41,7 +41,8 @@ fn first(engine: &Engine, port: &str) -> Option<f64> {
 /// The limits that have acted in the last tick.
 fn acting(engine: &Engine) -> Vec<String> {
     let scale = |id| engine.bus().get::<tactflow_runtime::signal::Scalar>(id).map_or(1.0, |scale| *scale);
-    engine.limits().filter(|(_, id)| scale(*id) < 1.0).map(|(name, _)| name.to_owned()).collect()
+    // A limit that is just reached may scale by a rounding error.
+    engine.limits().filter(|(_, id)| scale(*id) < 1.0 - 1e-12).map(|(name, _)| name.to_owned()).collect()
 }
 
 #[test]
@@ -88,7 +89,7 @@ fn random_changes_in_contact_jump_nowhere_and_touch_no_other_limit() {
     let catalogue = catalogue();
     let (mut engine, mut plain) = (engine(&request), engine(&request));
     let mut changer = Changer::new(&mut engine, &request, |request| compile(&catalogue, request).map(drop)).unwrap();
-    let (mut random, mut sent, mut last) = (Random::new(18, 0), 0, [3.5, 4.5]);
+    let (mut random, mut sent, mut last) = (Random::new(18, 0), 0, [3.5, 4.0]);
     let (mut acted, mut allowed) = (BTreeSet::new(), BTreeSet::new());
     while let Some(now) = engine.next().filter(|now| *now < 8_000_000_000) {
         if engine.mode() == Some("servo") && engine.ticks() % 15 == 0 {
@@ -139,13 +140,13 @@ fn a_change_is_in_the_summary_and_comes_again_in_a_replay() {
     let args = [&["run", "graphs/hybrid.toml"], &change[..]].concat();
     let run = say(&args);
     assert_eq!(run.code, 0, "{}", run.err);
-    for line in ["`pid.gains.y.kp` changed from 4.5 to 2 at 1.200 s", " to 3 at 1.4"] {
+    for line in ["`pid.gains.y.kp` changed from 4 to 2 at 1.200 s", " to 3 at 1.4"] {
         assert!(run.out.contains(line), "{line}\n{}", run.out);
     }
     let folder = tempfile::tempdir().unwrap();
     let path = recorded(folder.path(), &[&["graphs/hybrid.toml"], &change[..]].concat());
     assert_eq!(ticks_of_replay(&path), Ok(1001));
-    let event = "`pid.gains.y.kp` changes from 4.5 to 2";
+    let event = "`pid.gains.y.kp` changes from 4 to 2";
     let bytes = std::fs::read(&path).unwrap();
     assert!(bytes.windows(event.len()).any(|window| window == event.as_bytes()), "the log has no event");
     // Another graph that does not list the parameter cannot repeat the run, and says so.
@@ -196,6 +197,6 @@ fn a_run_in_real_time_changes_too_and_comes_again() {
     let path = recorded(folder.path(), &args);
     assert_eq!(ticks_of_replay(&path), Ok(501));
     let run = say(&[&["run"], &args[..]].concat());
-    assert!(run.out.contains("`pid.gains.y.kp` changed from 4.5 to 3.5 at 0.2"), "{}", run.out);
+    assert!(run.out.contains("`pid.gains.y.kp` changed from 4 to 3.5 at 0.2"), "{}", run.out);
     assert!(!run.out.contains("on its way"), "{}", run.out);
 }

@@ -151,7 +151,7 @@ fn a_replay_that_differs_names_the_tick_the_port_and_the_component_and_ends_with
     let csv = folder.path().join("run.csv");
     let path = recorded(folder.path(), &["graphs/hybrid.toml", "--for", "3s", "--out", csv.to_str().unwrap()]);
     let first = first_number(&csv, "pid.control.y");
-    let said = replay(&edited(&path, "gains.y = { kp = 4.5 }", "gains.y = { kp = 4.1 }"), &["-q"]);
+    let said = replay(&edited(&path, "gains.y = { kp = 4.0 }", "gains.y = { kp = 4.1 }"), &["-q"]);
     assert_eq!((said.code, said.out.as_str()), (1, ""));
     let place = format!(" from tick {first} at ");
     assert!(said.err.contains(&place) && said.err.contains("`pid.control` differs"), "{}", said.err);

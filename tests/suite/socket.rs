@@ -88,7 +88,7 @@ fn a_gain_is_changed_within_its_range_and_the_summary_says_so() {
     assert!(session.say(&["set", "pid.gains.y.kp=3", "pid.gains.y.kp=2"]).err.contains("given twice"));
     let answer = session.print(&["set", "pid.gains.y.kp=3.5"]);
     // 1 at 2 per second, in ticks that take 0.8 of it.
-    assert_eq!(answer.trim(), "`pid.gains.y.kp` goes from 4.5 to 3.5 in about 0.6 s");
+    assert_eq!(answer.trim(), "`pid.gains.y.kp` goes from 4 to 3.5 in about 0.3 s");
     let live = || {
         let got: Value = serde_json::from_str(&session.print(&["get", KP, "--format", "json"])).unwrap();
         got["live"][0].clone()
@@ -103,7 +103,7 @@ fn a_gain_is_changed_within_its_range_and_the_summary_says_so() {
     let text = session.print(&["get", KP]);
     assert!(text.contains("live parameter") && text.contains("2/s"), "{text}");
     let end = session.end();
-    assert!(end.out.contains("`pid.gains.y.kp` changed from 4.5 to 3.5 at "), "{}", end.out);
+    assert!(end.out.contains("`pid.gains.y.kp` changed from 4 to 3.5 at "), "{}", end.out);
     assert!(!end.out.contains("cannot be 7"), "{}", end.out);
 }
 
@@ -137,7 +137,7 @@ fn only_words_that_stop_are_sent() {
     // What came over the socket is in the recording, and comes again.
     let replay = session.say(&["replay", &recording]);
     assert!(
-        replay.code == 0 && replay.out.contains("`pid.gains.y.kp` changed from 4.5 to 3.5"),
+        replay.code == 0 && replay.out.contains("`pid.gains.y.kp` changed from 4 to 3.5"),
         "{}{}",
         replay.out,
         replay.err
@@ -239,7 +239,7 @@ fn garbage_is_refused_and_delays_nobody() {
         flood.set_nonblocking(true).unwrap();
         (0..50).for_each(|_| _ = flood.write(&noise));
     }
-    assert!(session.print(&["get", KP]).contains(" 4.5 "));
+    assert!(session.print(&["get", KP]).contains(" 4 "));
     // The places of the floods are free once the run has closed them, and are taken too.
     let mut idle = Vec::new();
     let full = wait_for(
@@ -375,11 +375,11 @@ fn a_saved_value_is_the_only_change_of_the_file() {
     assert_eq!(refused.code, 2);
     assert_eq!(std::fs::read_to_string(&path).unwrap(), before);
     let saved = session.print(&["set", "pid.gains.y.kp=3.25", "--save"]);
-    assert!(saved.contains("saved nodes.pid.gains.y.kp = 3.25 (before: 4.5) to "), "{saved}");
+    assert!(saved.contains("saved nodes.pid.gains.y.kp = 3.25 (before: 4) to "), "{saved}");
     let after = std::fs::read_to_string(&path).unwrap();
     let changed: Vec<(&str, &str)> = before.lines().zip(after.lines()).filter(|(old, new)| old != new).collect();
     let [(old, new)] = changed[..] else { panic!("{changed:?}") };
-    assert_eq!(new, old.replace("kp = 4.5", "kp = 3.25"));
+    assert_eq!(new, old.replace("kp = 4.0", "kp = 3.25"));
     assert_eq!(before.lines().count(), after.lines().count());
     session.end();
     session.print(&["check", graph]);
@@ -406,7 +406,7 @@ fn the_program_of_the_page_runs() {
     let mut python = Command::new("python3");
     let ran = said(python.args(["-c", program]).env("XDG_RUNTIME_DIR", session.folder.path()));
     assert_eq!((ran.code, ran.err.as_str()), (0, ""), "{}", ran.out);
-    assert!(ran.out.starts_with("pid.gains.y.kp from 4.5 to 3.5\n"), "{}", ran.out);
+    assert!(ran.out.starts_with("pid.gains.y.kp from 4.0 to 3.5\n"), "{}", ran.out);
     assert!(ran.out.lines().count() > 20, "{}", ran.out);
 }
 

@@ -230,7 +230,7 @@ pub(super) fn opposed() -> Vec<(&'static str, Variant)> {
                 "hybrid",
                 &[
                     "set nodes.last.type=\"projector\"",
-                    "set nodes.last.in.twist=\"sum.twist\"",
+                    "set nodes.last.in.twist=\"damping.twist\"",
                     "set nodes.last.select=[1, 1, 1, 0, 0, 0]",
                     "set modes.approach.set.last.select=[0, 0, 0, 0, 0, 0]",
                     "set parts.move.in.twist=\"last.twist\"",
