@@ -15,6 +15,9 @@ const STATED_AT_LEAST: f64 = 0.01;
 /// How many times as much or as little as stated the compliance may be [1].
 const MOST: f64 = 3.0;
 
+/// A force that misses the lead by more than this is no measurement [m].
+const MOST_SWING_M: f64 = 0.01;
+
 /// What is known of the spring of an arm.
 #[derive(Debug, State)]
 pub(super) struct Spring {
@@ -57,11 +60,15 @@ impl Bent {
 
 impl Spring {
     /// Takes the next lead [m] and force [N], `dt` [s] after the last ones, of an arm with this stated compliance [m/N].
-    pub(super) fn next(&mut self, compliance: f64, lead: f64, force: f64, dt: f64) -> Bent {
+    /// Returns `None`, and takes nothing, if the force is no measurement: a frame of garbage would be learned.
+    pub(super) fn next(&mut self, compliance: f64, lead: f64, force: f64, dt: f64) -> Option<Bent> {
         let stated = compliance * force;
         let begun = || Contact { rest: lead - self.factor(compliance) * stated, stayed: 0.0, swing: 0.0 };
         let mut contact = self.contact.unwrap_or_else(begun);
         let lead = lead - contact.rest;
+        if (lead - self.factor(compliance) * stated - contact.stayed).abs() > MOST_SWING_M {
+            return None;
+        }
         let kept = 1.0 - share(dt, MEMORY_S);
         self.stated = Some((kept * self.stated.unwrap_or(STATED)).max(STATED_AT_LEAST));
         self.products = kept * self.products + lead * stated * dt;
@@ -70,7 +77,7 @@ impl Spring {
         contact.stayed += (lead - deflection - contact.stayed) * share(dt, SETTLE_S);
         contact.swing += (lead - deflection - contact.stayed - contact.swing) * share(dt, SMOOTH_S);
         self.contact = Some(contact);
-        Bent { deflection, swing: contact.swing }
+        Some(Bent { deflection, swing: contact.swing })
     }
 
     /// The contact ends. What has been learned of the spring stays.

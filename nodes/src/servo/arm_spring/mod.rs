@@ -31,7 +31,7 @@ use learned::Spring;
 /// when the contact ends.
 ///
 /// Both outputs are absent while an input is absent. So they are absent while nothing touches the pad. They are also absent
-/// while all commands are held, for an arm without `joint_n_m_per_rad`, which is stiff, and for a force that is not in N.
+/// while the force misses the lead by more than 10 mm, as in a frame of garbage, while all commands are held, for an arm without `joint_n_m_per_rad`, which is stiff, and for a force that is not in N.
 ///
 /// ```toml
 /// [nodes.arm_spring]
@@ -117,7 +117,7 @@ impl Node for ArmSpring {
             return;
         };
         let dt = inputs.force.and_then(|force| state.interval.step(&force, tick)).unwrap_or(0.0);
-        let bent = state.spring.next(compliance * give, lead, force, dt.min(tick.max_gap));
+        let Some(bent) = state.spring.next(compliance * give, lead, force, dt.min(tick.max_gap)) else { return };
         if !bent.is_finite() {
             // A sample that is not a number would stay in the sums.
             *state = self.state();

@@ -85,16 +85,16 @@ fn a_lead_without_a_force_is_a_swing_and_what_stays_is_none() {
 
 #[test]
 fn the_true_compliance_is_learned_up_to_a_factor_of_three_and_stays_after_the_contact() {
-    for (times, learned) in [(0.5, 0.5), (2.0, 2.0), (10.0, 3.0), (-1.0, 1.0 / 3.0)] {
+    for (times, most, learned) in [(0.5, 3.0, 0.5), (2.0, 3.0, 2.0), (10.0, 0.4, 3.0), (-1.0, 2.0, 1.0 / 3.0)] {
         let mut cell = Cell::new(JOINT, Unit::NEWTON);
         let press = |cell: &mut Cell| {
-            let force = |i: u32| 3.0 - 3.0 * libm::exp(-0.02 * f64::from(i));
+            let force = |i: u32| most - most * libm::exp(-0.02 * f64::from(i));
             (0..3000).map(|i| cell.step(force(i), times * COMPLIANCE * force(i)).unwrap()[0]).last().unwrap()
         };
-        let found = press(&mut cell) / (3.0 * COMPLIANCE);
+        let found = press(&mut cell) / (most * COMPLIANCE);
         assert!((found / learned - 1.0).abs() < 0.1, "{times}: {found}");
         assert_eq!(cell.step(None, 0.0), None, "without a contact");
-        let again = cell.step(3.0, 0.0).unwrap()[0] / (3.0 * COMPLIANCE);
+        let again = cell.step(most, 0.0).unwrap()[0] / (most * COMPLIANCE);
         assert!((again / found - 1.0).abs() < 0.02, "{times}: {again} after {found}");
     }
 }
@@ -163,4 +163,14 @@ fn between_two_forces_nothing_swings() {
     cell.rig.set("equilibrium", Joints([0.4].into()));
     cell.rig.step_ms(1e3 * PERIOD);
     assert_eq!(cell.rig.get::<Scalar>("swing"), Some(&before[1]));
+}
+
+#[test]
+fn a_frame_of_garbage_is_not_learned_and_is_no_swing() {
+    let mut cell = Cell::new(JOINT, Unit::NEWTON);
+    let force = |i: u32| 3.0 - 3.0 * libm::exp(-0.02 * f64::from(i));
+    let before = (0..500).map(|i| cell.step(force(i), COMPLIANCE * force(i)).unwrap()).last().unwrap();
+    assert_eq!(cell.step(1000.0, COMPLIANCE * 3.0), None);
+    let after = cell.step(3.0, COMPLIANCE * 3.0).unwrap();
+    assert!((after[0] - before[0]).abs() < 1e-5 && (after[1] - before[1]).abs() < 1e-5, "{before:?}, then {after:?}");
 }
