@@ -31,7 +31,8 @@ use learned::Spring;
 /// when the contact ends.
 ///
 /// Both outputs are absent while an input is absent. So they are absent while nothing touches the pad. They are also absent
-/// while the force misses the lead by more than 10 mm, as in a frame of garbage, while all commands are held, for an arm without `joint_n_m_per_rad`, which is stiff, and for a force that is not in N.
+/// while the force misses the lead by more than 10 mm, as in a frame of garbage, while all commands are held, for an arm
+/// without `joint_n_m_per_rad`, which is stiff, and for a force that is not in N.
 ///
 /// ```toml
 /// [nodes.arm_spring]
