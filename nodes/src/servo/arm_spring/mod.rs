@@ -112,7 +112,8 @@ impl Node for ArmSpring {
     }
 
     fn step(&self, tick: &Tick, inputs: Inputs<'_>, out: &mut Outputs, state: &mut State) {
-        let pressed = self.compliance.zip(pressed(&inputs)).filter(|_| !tick.is_halted);
+        let compliance = self.compliance.filter(|_| !tick.is_halted);
+        let pressed = compliance.and_then(|compliance| Some((compliance, pressed(&inputs)?)));
         let Some((compliance, [give, lead, force])) = pressed else {
             state.spring.release();
             return;
