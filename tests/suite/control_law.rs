@@ -41,6 +41,16 @@ fn factor(schedule: &Value, row: &BTreeMap<String, f64>) -> f64 {
     (1.0 / ratio).clamp(bound("min"), bound("max"))
 }
 
+/// The control that a controller may take from one tick to the next: it grows as its `rise` allows.
+fn grown(feature: &Value, wanted: f64, last: &BTreeMap<String, f64>, row: &BTreeMap<String, f64>) -> f64 {
+    let Some(rise) = feature["rise"].as_f64() else { return wanted };
+    let name = format!("pid.control.{}", feature["name"].as_str().unwrap());
+    // It begins at zero.
+    let Some(control) = last.get(&name) else { return 0.0 };
+    let step = rise * (row["time"] - last["time"]);
+    wanted.clamp(control.min(0.0) - step, control.max(0.0) + step)
+}
+
 /// Asserts that the twist of each tick is the sum of the columns times the controls and of the constants, and that a
 /// control without integral and derivative is kp times its error.
 fn assert_is_the_law_of_a_run(graph: &str, sum: &str, for_s: &str) {
@@ -48,7 +58,7 @@ fn assert_is_the_law_of_a_run(graph: &str, sum: &str, for_s: &str) {
     let modes = explained["motions"][0]["modes"].as_array().unwrap();
     let (mut compared, rows) = (0, recorded(&[graph], for_s));
     // A tick in which the mode changes writes the twist of the one before.
-    for row in rows.windows(2).filter(|pair| pair[0]["mode"] == pair[1]["mode"]).map(|pair| &pair[1]) {
+    for [last, row] in rows.array_windows().filter(|[last, row]| last["mode"] == row["mode"]) {
         let mode = &modes[row["mode"] as usize];
         let mut twist = [0.0; 6];
         for feature in mode["features"].as_array().unwrap() {
@@ -57,7 +67,7 @@ fn assert_is_the_law_of_a_run(graph: &str, sum: &str, for_s: &str) {
             if let (Some(0.0), Some(0.0), Some(error)) =
                 (feature["ki"].as_f64(), feature["kd"].as_f64(), row.get(&format!("error.error.{name}")))
             {
-                let by_hand = feature["kp"].as_f64().unwrap() * error;
+                let by_hand = grown(feature, feature["kp"].as_f64().unwrap() * error, last, row);
                 assert!((control - by_hand).abs() < 1e-9, "{graph}, {name}: {control} and {by_hand}");
             }
             let schedules = feature["schedules"].as_array().into_iter().flatten();
@@ -110,9 +120,14 @@ fn every_shipped_task_is_explained_for_a_person_and_for_a_page() {
         assert_eq!(say(&["explain", &graph, "--format", "markdown"]).code, shown.code, "{graph}");
     }
     let page = say(&["explain", "graphs/hybrid.toml"]).out;
-    for text in
-        ["in the mode `servo`", "-3.5", "At rest: wx, wy, wz.", "`move.contact` (`contact_limit`)", "force_n = 15.0"]
-    {
+    for text in [
+        "in the mode `servo`",
+        "-3.5",
+        "`pid` lets the control of `x` grow by 0.25 in a second",
+        "At rest: wx, wy, wz.",
+        "`move.contact` (`contact_limit`)",
+        "force_n = 15.0",
+    ] {
         assert!(page.contains(text), "{text}: {page}");
     }
 }

@@ -100,14 +100,14 @@ fn another_gain_is_told_apart_at_the_first_tick_with_an_error() {
     let folder = tempfile::tempdir().unwrap();
     let csv = folder.path().join("run.csv");
     let path = recorded(folder.path(), &["graphs/hybrid.toml", "--for", "3s", "--out", csv.to_str().unwrap()]);
-    // The gain multiplies the error of x: the control differs from the first tick on in which it is not zero.
-    let first = first_number(&csv, "pid.control.x");
-    let said = replay(&path, &["-q", "--set", "nodes.pid.gains.x.kp=3.4"]);
+    // The gain multiplies the error of the pressure: the control differs from the first tick on in which it is not zero.
+    let first = first_number(&csv, "pid.control.pressure");
+    let said = replay(&path, &["-q", "--set", "nodes.pid.gains.pressure.kp=0.4"]);
     assert_eq!((said.code, said.err.as_str()), (0, ""));
     assert!(said.out.starts_with("open loop: "), "{}", said.out);
     let row = said.out.lines().find(|line| line.trim_start().starts_with("pid.control ")).unwrap();
     assert_eq!(row.split_whitespace().nth(1), Some(first.to_string().as_str()), "{row}");
-    assert!(row.contains("`x`: "), "{row}");
+    assert!(row.contains("`pressure`: "), "{row}");
     let untouched = ["error.error ", "touch.", "pad.image "];
     assert!(untouched.iter().all(|port| !said.out.lines().any(|line| line.starts_with(port))), "{}", said.out);
 }
@@ -150,12 +150,12 @@ fn a_replay_that_differs_names_the_tick_the_port_and_the_component_and_ends_with
     let folder = tempfile::tempdir().unwrap();
     let csv = folder.path().join("run.csv");
     let path = recorded(folder.path(), &["graphs/hybrid.toml", "--for", "3s", "--out", csv.to_str().unwrap()]);
-    let first = first_number(&csv, "pid.control.y");
-    let said = replay(&edited(&path, "gains.y = { kp = 4.0 }", "gains.y = { kp = 4.1 }"), &["-q"]);
+    let first = first_number(&csv, "pid.control.pressure");
+    let said = replay(&edited(&path, "gains.pressure = { kp = 0.5", "gains.pressure = { kp = 0.6"), &["-q"]);
     assert_eq!((said.code, said.out.as_str()), (1, ""));
     let place = format!(" from tick {first} at ");
     assert!(said.err.contains(&place) && said.err.contains("`pid.control` differs"), "{}", said.err);
-    assert!(said.err.contains("`y`: "), "{}", said.err);
+    assert!(said.err.contains("`pressure`: "), "{}", said.err);
 }
 
 #[test]

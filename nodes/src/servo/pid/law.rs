@@ -4,7 +4,7 @@
 //! gain means the same at 100 Hz and at 1 kHz, and one sample is never integrated twice; the paper sums without dt, so
 //! its KI is ki times the period and its KD is kd over the period. The integral is kept in units of the control, so a
 //! change of ki makes no jump; it runs only near the target (`within`), is bounded, and does not grow outwards while
-//! the output is at its limit. The error of a line's direction is differenced modulo pi.
+//! the output is at its limit or grows as fast as it may. The error of a line's direction is differenced modulo pi.
 
 use tactflow_runtime::node::{Absence, Interval};
 use tactflow_runtime::signal::Unit;
@@ -20,6 +20,8 @@ pub(super) struct Memory {
     integral: f64,
     /// Error of the last sample, in the feature's unit.
     error: f64,
+    /// The last control, in the feature's unit per second.
+    control: f64,
     pub(super) interval: Interval,
     pub(super) absence: Absence,
 }
@@ -32,6 +34,7 @@ pub(super) struct Law {
     within: f64,
     bound: f64,
     limit: f64,
+    rise: Option<f64>,
     is_axial: bool,
     /// Whether anything reads its control; otherwise it is frozen.
     pub(super) is_wanted: bool,
@@ -39,13 +42,13 @@ pub(super) struct Law {
 
 impl Law {
     pub(super) fn new(gains: &Gains, unit: Unit) -> Self {
-        let Gains { kp, ki, kd, bound, .. } = *gains;
+        let Gains { kp, ki, kd, bound, rise, .. } = *gains;
         let [within, limit] = [gains.within, gains.limit].map(|bound| bound.unwrap_or(f64::INFINITY));
-        Self { kp, ki, kd, within, bound, limit, is_axial: unit.is_axial(), is_wanted: true }
+        Self { kp, ki, kd, within, bound, limit, rise, is_axial: unit.is_axial(), is_wanted: true }
     }
 
-    /// Returns the control for an error that comes `dt` [s] after the last one. Without a time there is neither a slope
-    /// nor growth of the integral.
+    /// Returns the control for an error that comes `dt` [s] after the last one. Without a time there is no slope, and
+    /// nothing grows: neither the integral, nor a control with a `rise`.
     pub(super) fn control(&self, error: f64, dt: Option<f64>, memory: &mut Memory) -> f64 {
         let change = error - memory.error;
         let change = if self.is_axial { wrap_axial(change) } else { change };
@@ -53,8 +56,13 @@ impl Law {
         let slope = if dt > 0.0 { change / dt } else { 0.0 };
         let others = self.kp * error + self.kd * slope;
         let growth = if error.abs() <= self.within { self.ki * error * dt } else { 0.0 };
-        memory.integral = integrate(memory.integral, growth, self.bound, others, self.limit);
+        // How far the control may be from zero, on the side of the last one and on the other side.
+        let step = self.rise.map_or(f64::INFINITY, |rise| rise * dt);
+        let [most, other] = [memory.control.abs() + step, step].map(|most| most.min(self.limit));
+        memory.integral = integrate(memory.integral, growth, self.bound, others, most);
         memory.error = error;
-        (others + memory.integral).clamp(-self.limit, self.limit)
+        let (low, high) = if memory.control < 0.0 { (-most, other) } else { (-other, most) };
+        memory.control = (others + memory.integral).clamp(low, high);
+        memory.control
     }
 }

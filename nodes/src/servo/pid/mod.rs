@@ -23,6 +23,10 @@ use law::{Law, Memory};
 /// already, so ki is for creep and for objects that move. The integral grows only while the error is `within`, never
 /// exceeds `bound`, and does not grow outward while the control is at its `limit`.
 ///
+/// `rise` bounds how fast the control grows. It begins at zero and falls at once. A compliant arm that sets off with a
+/// jump swings, also along directions in which nothing is commanded. An error e is reduced about kp e / (2 `rise`) later
+/// than without it. It must be larger than kp n / T if noise changes e by n in a period T: smaller ones make kp smaller.
+///
 /// A repeated sample is neither integrated nor differentiated, and neither is the first one after a gap longer than the
 /// graph's `max_gap_ms`. A feature that is absent contributes nothing; its integral survives flicker and is reset when
 /// the feature is absent for the graph's `reset_after_ms`. kd amplifies noise: smooth the feature first, or leave it 0.
@@ -34,7 +38,7 @@ use law::{Law, Memory};
 /// [nodes.pid]
 /// type = "pid"
 /// in.error = "error.error"
-/// gains.x = { kp = 2.0 }              # [1/s]
+/// gains.x = { kp = 2.0, rise = 0.2 }  # [1/s, m/s2]
 /// gains.y = { kp = 2.0 }
 /// gains.pressure = { kp = 0.2, ki = 0.06, within = 0.02 }   # integrates only near the target
 /// ```
@@ -76,6 +80,9 @@ struct Gains {
     /// Bound on the whole control; without it, the control has no bound.
     #[param(unit = "E/s", above = 0.0)]
     limit: Option<f64>,
+    /// Bound on how fast the control grows away from zero; without it, it grows at once.
+    #[param(unit = "E/s2", above = 0.0)]
+    rise: Option<f64>,
 }
 
 impl Gains {

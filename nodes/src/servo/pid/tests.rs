@@ -201,7 +201,49 @@ fn at_the_limit_the_integral_does_not_wind_up() {
     }
 }
 
+#[test]
+fn the_control_grows_as_fast_as_it_may_and_falls_at_once() {
+    for sign in [1.0, -1.0] {
+        let mut rig = one(Unit::METRE, "kp = 2.0, rise = 3.0");
+        let errors = [1.0, 1.0, 1.0, 0.02, 0.02, 1.0, -1.0, -1.0, 0.0];
+        let expected = [0.0, 0.03, 0.06, 0.04, 0.04, 0.07, -0.03, -0.06, 0.0];
+        for (k, (error, expected)) in errors.into_iter().zip(expected).enumerate() {
+            assert_near(feed(&mut rig, sign * error, 10.0), sign * expected, &format!("sample {k}"));
+        }
+        feed(&mut rig, sign, 1000.0);
+        assert_near(feed(&mut rig, sign, 10.0), 0.03 * sign, "a gap is no time in which it grows");
+        feed_all(&mut rig, &[None; 1], 50.0);
+        assert_eq!(feed(&mut rig, sign, 10.0), 0.0, "after an absence it begins at zero");
+    }
+}
+
+#[test]
+fn while_the_control_grows_the_integral_does_not_wind_up() {
+    let mut rig = one(Unit::METRE, "kp = 2.0, ki = 1.0, bound = 10.0, rise = 1.0");
+    let found = (0..=100).map(|_| feed(&mut rig, 1.0, 10.0)).last().unwrap();
+    assert_near(found, 1.0, "after a second");
+    assert_eq!(feed(&mut rig, 0.0, 10.0), 0.0, "the proportional part was larger, so nothing was integrated");
+    let mut rig = one(Unit::METRE, "ki = 1.0, rise = 2.0");
+    let found = (0..=50).map(|_| feed(&mut rig, 1.0, 10.0)).last().unwrap();
+    assert_near(found, 0.5, "an integral that grows slower than that is free");
+}
+
 proptest! {
+    #[test]
+    fn the_control_never_grows_faster(
+        errors in proptest::collection::vec(-5.0_f64..5.0, 1..60),
+        gains in prop::sample::select(vec!["kp = 1.0", "ki = 20.0", "kp = 3.0, ki = 9.0, kd = 0.01, limit = 0.02"]),
+    ) {
+        let mut rig = one(Unit::METRE, &format!("{gains}, rise = 0.5"));
+        let mut last: f64 = 0.0;
+        for error in errors {
+            let control = feed(&mut rig, error, 4.0);
+            let beyond = if control * last < 0.0 { control.abs() } else { control.abs() - last.abs() };
+            prop_assert!(beyond <= 0.002 + 1e-12, "{last}, then {control}");
+            last = control;
+        }
+    }
+
     #[test]
     fn the_control_keeps_its_limit(errors in proptest::collection::vec(-5.0_f64..5.0, 1..60)) {
         let mut rig = one(Unit::METRE, "kp = 1.0, ki = 20.0, kd = 0.01, bound = 0.7, limit = 0.9");
@@ -324,7 +366,16 @@ fn gains_and_features_must_agree() {
         let found: Vec<_> = mistakes.into_iter().map(|mistake| (mistake.code, mistake.at)).collect();
         assert_eq!(found, expected, "{params}");
     }
-    let bad = ["kq = 1.0", "kp = \"high\"", "kp = nan", "within = 0.0", "bound = -1.0", "bound = 0", "limit = 0.0"];
+    let bad = [
+        "kq = 1.0",
+        "kp = \"high\"",
+        "kp = nan",
+        "within = 0.0",
+        "bound = -1.0",
+        "bound = 0",
+        "limit = 0.0",
+        "rise = 0.0",
+    ];
     for bad in bad {
         let params = format!("gains = {{ x = {{ {bad} }}, y = {{}} }}");
         let mistakes = NodeRig::new::<Pid>(&params, &wires).err().unwrap();

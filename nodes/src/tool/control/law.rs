@@ -26,6 +26,9 @@ pub(crate) struct Feature {
     pub(crate) kp: f64,
     pub(crate) ki: f64,
     pub(crate) kd: f64,
+    /// By how much its control may grow in a second.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(crate) rise: Option<f64>,
     /// The port that is measured, before its filters.
     pub(crate) measured: Option<String>,
     pub(crate) setpoint: Option<f64>,
@@ -177,7 +180,7 @@ pub(super) fn feature<'a>(nodes: &Nodes<'a>, jacobian: &'a OutlinedBlock, name: 
     let next = |node: &&'a OutlinedBlock| before(node, "control", "gain_schedule");
     let scheduled: Vec<_> = std::iter::successors(next(&jacobian), next).collect();
     let pid = before(scheduled.last().copied().unwrap_or(jacobian), "control", "pid");
-    let gain = |which: &str| pid.and_then(|pid| nodes.number(pid, &format!("gains.{name}.{which}"))).unwrap_or(0.0);
+    let number = |which: &str| pid.and_then(|pid| nodes.number(pid, &format!("gains.{name}.{which}")));
     let behind = pid.map(|pid| before(pid, "error", "deadband").unwrap_or(pid));
     let error = behind.and_then(|node| before(node, "error", "feature_error"));
     let setpoint = error.and_then(|error| setpoint(nodes, &error.name, &name));
@@ -185,7 +188,8 @@ pub(super) fn feature<'a>(nodes: &Nodes<'a>, jacobian: &'a OutlinedBlock, name: 
     let measured = way.as_ref().map(|way| way.measured.clone());
     let (filters, gates) = way.map(|way| (way.filters, way.gates)).unwrap_or_default();
     let sides = Vec::new();
-    let [kp, ki, kd] = ["kp", "ki", "kd"].map(gain);
+    let [kp, ki, kd] = ["kp", "ki", "kd"].map(|which| number(which).unwrap_or(0.0));
+    let rise = number("rise");
     let compared = error.map(|error| error.name.clone());
     let pid = pid.map(|pid| pid.name.clone());
     let schedules = scheduled.into_iter().filter_map(|node| Schedule::of(nodes, node, &name, measured.as_deref()));
@@ -196,6 +200,7 @@ pub(super) fn feature<'a>(nodes: &Nodes<'a>, jacobian: &'a OutlinedBlock, name: 
         kp,
         ki,
         kd,
+        rise,
         measured,
         setpoint,
         filters,

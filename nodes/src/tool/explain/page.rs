@@ -76,6 +76,7 @@ fn law(mode: &ModeLaw, style: &Style) -> String {
     }
     let moving = || law.features.iter().filter(|one| one.moves());
     text += &moving().flat_map(|one| one.schedules.iter().map(|schedule| scheduled(one, schedule))).collect::<String>();
+    text += &moving().filter_map(rising).collect::<String>();
     text += &moving().filter_map(together).collect::<String>();
     let off: Vec<String> =
         law.features.iter().filter(|one| !one.moves()).map(|one| format!("`{}`", one.name)).collect();
@@ -112,6 +113,13 @@ fn scheduled(feature: &Feature, schedule: &Schedule) -> String {
         None => format!("{range}, by what this command does not know: there are no margins"),
     };
     format!("`{node}` multiplies the gains of `{}` {by}.\n", feature.name)
+}
+
+/// Says how fast the motion for a feature may begin.
+fn rising(feature: &Feature) -> Option<String> {
+    let (pid, rise) = (feature.pid.as_ref()?, feature.rise?);
+    let (name, rise) = (&feature.name, number(rise));
+    Some(format!("`{pid}` lets the control of `{name}` grow by {rise} in a second: large errors are reduced later.\n"))
 }
 
 /// Says what else answers the same measurement.
