@@ -17,6 +17,8 @@ const MOST: f64 = 3.0;
 
 /// A force that misses the lead by more than this is no measurement [m].
 const MOST_SWING_M: f64 = 0.01;
+/// After forces have missed it for so long, what is wrong is the lead with which the contact began [s].
+const MISSED_S: f64 = 0.1;
 
 /// What is known of the spring of an arm.
 #[derive(Debug, State)]
@@ -29,6 +31,8 @@ pub(super) struct Spring {
     squares: f64,
     /// The contact, while there is one.
     contact: Option<Contact>,
+    /// For how long each force has missed the lead [s].
+    missed: f64,
 }
 
 /// The filters during one contact.
@@ -60,15 +64,21 @@ impl Bent {
 
 impl Spring {
     /// Takes the next lead [m] and force [N], `dt` [s] after the last ones, of an arm with this stated compliance [m/N].
-    /// Returns `None`, and takes nothing, if the force is no measurement: a frame of garbage would be learned.
+    /// Returns `None`, and takes nothing, if the force is no measurement: a frame of garbage would be learned. A contact
+    /// that began with such a frame begins again.
     pub(super) fn next(&mut self, compliance: f64, lead: f64, force: f64, dt: f64) -> Option<Bent> {
         let stated = compliance * force;
         let begun = || Contact { rest: lead - self.factor(compliance) * stated, stayed: 0.0, swing: 0.0 };
         let mut contact = self.contact.unwrap_or_else(begun);
         let lead = lead - contact.rest;
         if (lead - self.factor(compliance) * stated - contact.stayed).abs() > MOST_SWING_M {
+            self.missed += dt;
+            if self.missed > MISSED_S {
+                self.release();
+            }
             return None;
         }
+        self.missed = 0.0;
         let kept = 1.0 - share(dt, MEMORY_S);
         self.stated = Some((kept * self.stated.unwrap_or(STATED)).max(STATED_AT_LEAST));
         self.products = kept * self.products + lead * stated * dt;
@@ -82,7 +92,7 @@ impl Spring {
 
     /// The contact ends. What has been learned of the spring stays.
     pub(super) const fn release(&mut self) {
-        self.contact = None;
+        (self.contact, self.missed) = (None, 0.0);
     }
 
     /// Returns how many times as much as stated the arm gives way. One that the force cannot bend gives way as stated.

@@ -32,7 +32,8 @@ use learned::Spring;
 ///
 /// Both outputs are absent while an input is absent. So they are absent while nothing touches the pad. They are also absent
 /// while the force misses the lead by more than 10 mm, as in a frame of garbage, while all commands are held, for an arm
-/// without `joint_n_m_per_rad`, which is stiff, and for a force that is not in N.
+/// without `joint_n_m_per_rad`, which is stiff, and for a force that is not in N. If forces miss the lead for 0.1 s, the
+/// lead at the begin of the contact was wrong, and it counts afresh.
 ///
 /// ```toml
 /// [nodes.arm_spring]

@@ -174,3 +174,16 @@ fn a_frame_of_garbage_is_not_learned_and_is_no_swing() {
     let after = cell.step(3.0, COMPLIANCE * 3.0).unwrap();
     assert!((after[0] - before[0]).abs() < 1e-5 && (after[1] - before[1]).abs() < 1e-5, "{before:?}, then {after:?}");
 }
+
+#[test]
+fn a_contact_that_begins_with_garbage_begins_again() {
+    let mut cell = Cell::new(JOINT, Unit::NEWTON);
+    let force = |i: u32| 3.0 - 3.0 * libm::exp(-0.02 * f64::from(i));
+    cell.step(1000.0, 0.0);
+    let said: Vec<_> = (1..500).map(|i| cell.step(force(i), 0.001 + COMPLIANCE * force(i))).collect();
+    let silent = said.iter().take_while(|said| said.is_none()).count();
+    assert!((0.1..0.12).contains(&(PERIOD * silent as f64)), "silent for {silent} samples");
+    assert!(said[silent..].iter().all(Option::is_some));
+    let [deflection, swing] = said.last().unwrap().unwrap();
+    assert!((deflection - COMPLIANCE * 3.0).abs() < 1e-5 && swing.abs() < 1e-5, "{deflection} m and {swing} m");
+}
