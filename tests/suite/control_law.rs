@@ -45,10 +45,9 @@ fn factor(schedule: &Value, row: &BTreeMap<String, f64>) -> f64 {
 fn grown(feature: &Value, wanted: f64, last: &BTreeMap<String, f64>, row: &BTreeMap<String, f64>) -> f64 {
     let Some(rise) = feature["rise"].as_f64() else { return wanted };
     let name = format!("pid.control.{}", feature["name"].as_str().unwrap());
-    // It begins at zero.
-    let Some(control) = last.get(&name) else { return 0.0 };
-    let step = rise * (row["time"] - last["time"]);
-    wanted.clamp(control.min(0.0) - step, control.max(0.0) + step)
+    let control = last.get(&name).copied().unwrap_or(0.0);
+    let (step, least) = (rise * (row["time"] - last["time"]), rise * 0.02);
+    wanted.clamp((control.min(0.0) - step).min(-least), (control.max(0.0) + step).max(least))
 }
 
 /// Asserts that the twist of each tick is the sum of the columns times the controls and of the constants, and that a
@@ -123,7 +122,7 @@ fn every_shipped_task_is_explained_for_a_person_and_for_a_page() {
     for text in [
         "in the mode `servo`",
         "-3.5",
-        "`pid` lets the control of `x` grow by 0.25 in a second",
+        "`pid` lets the control of `x` grow by at most 0.25 per s2",
         "At rest: wx, wy, wz.",
         "`move.contact` (`contact_limit`)",
         "force_n = 15.0",

@@ -133,7 +133,7 @@ pub(super) fn poor_modes() -> Vec<(&'static str, Variant)> {
         ("line-position", variant("cable", &["select = [1, 1, 1, 0, 0, 1]"])),
         ("line-position", on("bent_cable", variant("cable", &["select = [1, 1, 1, 1, 0, 1]"]))),
         ("chattering-modes", variant("position", &["set modes.servo.go.below=0.07"])),
-        ("chattering-modes", variant("position", &["set modes.servo.go.below=0.06", "set modes.servo.go.for_ms=100"])),
+        ("chattering-modes", variant("position", &["set modes.servo.go.below=0.055", "set modes.servo.go.for_ms=100"])),
         (
             "chattering-modes",
             variant("position", &["set modes.press.go.above=0.03", "set modes.press.go.hysteresis=0.01"]),

@@ -13,6 +13,10 @@ use super::Gains;
 use crate::motion::axis::wrap_axial;
 use crate::servo::integral::integrate;
 
+/// Time of growth that a control with a `rise` has at once [s]. Noise of a feature at rest must not wait for it: it is
+/// as large at 1 kHz as at 100 Hz, and a bound on each sample would make its gain smaller.
+const START_S: f64 = 0.02;
+
 /// What is remembered of one feature.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct Memory {
@@ -48,7 +52,7 @@ impl Law {
     }
 
     /// Returns the control for an error that comes `dt` [s] after the last one. Without a time there is no slope, and
-    /// nothing grows: neither the integral, nor a control with a `rise`.
+    /// neither the integral nor a control with a `rise` grows.
     pub(super) fn control(&self, error: f64, dt: Option<f64>, memory: &mut Memory) -> f64 {
         let change = error - memory.error;
         let change = if self.is_axial { wrap_axial(change) } else { change };
@@ -57,8 +61,10 @@ impl Law {
         let others = self.kp * error + self.kd * slope;
         let growth = if error.abs() <= self.within { self.ki * error * dt } else { 0.0 };
         // How far the control may be from zero, on the side of the last one and on the other side.
-        let step = self.rise.map_or(f64::INFINITY, |rise| rise * dt);
-        let [most, other] = [memory.control.abs() + step, step].map(|most| most.min(self.limit));
+        let grown = |time: f64| self.rise.map_or(f64::INFINITY, |rise| rise * time);
+        let other = grown(dt.max(START_S));
+        let most = other.max(memory.control.abs() + grown(dt));
+        let [most, other] = [most, other].map(|most| most.min(self.limit));
         memory.integral = integrate(memory.integral, growth, self.bound, others, most);
         memory.error = error;
         let (low, high) = if memory.control < 0.0 { (-most, other) } else { (-other, most) };

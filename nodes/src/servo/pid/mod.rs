@@ -8,7 +8,7 @@ mod law;
 use tactflow_runtime::node::{
     At, Components, Describe, In, Inputs, Map, Mistake, Mistakes, Node, Out, Outputs, Param, Setup, State, Tick,
 };
-use tactflow_runtime::signal::{Features, Freshness, Unit};
+use tactflow_runtime::signal::{Feature, Features, Freshness, Unit};
 use tactflow_runtime::source::Code;
 
 use law::{Law, Memory};
@@ -23,13 +23,15 @@ use law::{Law, Memory};
 /// already, so ki is for creep and for objects that move. The integral grows only while the error is `within`, never
 /// exceeds `bound`, and does not grow outward while the control is at its `limit`.
 ///
-/// `rise` bounds how fast the control grows. It begins at zero and falls at once. A compliant arm that sets off with a
-/// jump swings, also along directions in which nothing is commanded. An error e is reduced about kp e / (2 `rise`) later
-/// than without it. It must be larger than kp n / T if noise changes e by n in a period T: smaller ones make kp smaller.
+/// `rise` bounds how fast the control grows; it falls at once. A compliant arm that sets off with a jump swings, also along
+/// directions in which nothing is commanded. So the control begins at what `rise` gives it in 20 ms, and grows from there.
+/// An error e is reduced later than without it, by at most about kp e / (2 `rise`). Errors of less than `rise` · 20 ms / kp
+/// are answered at once, and so is noise of that size. A `gain_schedule` behind this node multiplies the `rise` too.
 ///
 /// A repeated sample is neither integrated nor differentiated, and neither is the first one after a gap longer than the
-/// graph's `max_gap_ms`. A feature that is absent contributes nothing; its integral survives flicker and is reset when
-/// the feature is absent for the graph's `reset_after_ms`. kd amplifies noise: smooth the feature first, or leave it 0.
+/// graph's `max_gap_ms`. A feature that is absent contributes nothing; its integral and its control survive flicker and
+/// are reset when the feature is absent for the graph's `reset_after_ms`. kd amplifies noise: smooth the feature first,
+/// or leave it 0.
 ///
 /// A feature that nothing uses, because a projector deletes everything it contributes, is frozen: its control is
 /// absent, and it starts afresh in a mode that selects it.
@@ -58,6 +60,8 @@ pub struct Params {
 
 /// Part of the error that one period corrects, from which on the loop diverges: e := (1 - kp T) e [1].
 const MAX_STABLE_STEP: f64 = 2.0;
+/// A small error, in the unit of any feature: what a `rise` must answer as fast as kp says.
+const SMALL_ERROR: f64 = 0.001;
 
 /// Gains of one feature.
 #[derive(Debug, Clone, Param)]
@@ -87,30 +91,39 @@ struct Gains {
 
 impl Gains {
     /// Returns the warning about gains that do not reduce the error of a feature with one sample in each `period` [s].
-    fn warning(&self, feature: &str, period: f64) -> Option<Mistake> {
+    fn warning(&self, feature: &Feature, period: f64) -> Option<Mistake> {
+        let name = &feature.name;
         let warn = |code, gain: &str, message: String| {
-            Some(Mistake::new(code, At::Param(format!("gains.{feature}.{gain}")), message))
+            Some(Mistake::new(code, At::Param(format!("gains.{name}.{gain}")), message))
         };
         let negative = [("kp", self.kp), ("ki", self.ki), ("kd", self.kd)].into_iter().find(|(_, value)| *value < 0.0);
         if let Some((gain, value)) = negative {
-            let message = format!("the gain `{gain}` of `{feature}` is {value}: it increases the error");
-            let help =
-                format!("write `{gain} = {}`, and check that the column of `{feature}` reduces its error", -value);
+            let message = format!("the gain `{gain}` of `{name}` is {value}: it increases the error");
+            let help = format!("write `{gain} = {}`, and check that the column of `{name}` reduces its error", -value);
             return Some(warn(Code::UnusualGain, gain, message)?.help(help));
         }
         // A feature without any gain rests. Whether another mode gives it one is not known here.
         if self.kp == 0.0 && self.ki > 0.0 {
             let message =
-                format!("the gain `kp` of `{feature}` is 0 1/s: the integral alone corrects the error, and swings");
-            let help = format!("write a gain greater than 0, or remove the wire of `{feature}` to stop controlling it");
+                format!("the gain `kp` of `{name}` is 0 1/s: the integral alone corrects the error, and swings");
+            let help = format!("write a gain greater than 0, or remove the wire of `{name}` to stop controlling it");
             return Some(warn(Code::UnusualGain, "kp", message)?.help(help));
+        }
+        if let Some(rise) = self.rise.filter(|rise| *rise < self.kp * self.kp * SMALL_ERROR) {
+            let (unit, time) = (feature.unit, self.kp * SMALL_ERROR / rise);
+            let message = format!(
+                "the control of `{name}` grows by {rise} {unit}/s in a second: it takes {time:.1} s to answer an error of \
+                 {SMALL_ERROR} {unit}"
+            );
+            let help = format!("write `rise = {:.2}` or more, or remove it", 10.0 * self.kp * self.kp * SMALL_ERROR);
+            return Some(warn(Code::UnusualGain, "rise", message)?.help(help));
         }
         let (step, max) = (self.kp * period, MAX_STABLE_STEP / period);
         if step < MAX_STABLE_STEP {
             return None;
         }
         let message = format!(
-            "the gain `kp` of `{feature}` is {} 1/s, so one period of {} ms corrects {step:.1} times the error, and the loop \
+            "the gain `kp` of `{name}` is {} 1/s, so one period of {} ms corrects {step:.1} times the error, and the loop \
              diverges",
             self.kp,
             (period * 1e6).round() / 1e3
@@ -154,7 +167,8 @@ impl Node for Pid {
     fn new(params: Params, setup: &mut Setup<Self>) -> Result<Self, Mistakes> {
         let shape = &setup.inputs.error;
         let gains = params.gains.in_order("gains", shape.names())?;
-        let warnings = shape.names().zip(&gains).filter_map(|(name, gains)| gains.warning(name, setup.period));
+        let warnings =
+            gains.iter().zip(&shape.features).filter_map(|(gains, feature)| gains.warning(feature, setup.period));
         setup.warnings.extend(warnings);
         let laws =
             gains.into_iter().zip(&shape.features).map(|(gains, feature)| Law::new(gains, feature.unit)).collect();

@@ -26,7 +26,7 @@ pub(crate) struct Feature {
     pub(crate) kp: f64,
     pub(crate) ki: f64,
     pub(crate) kd: f64,
-    /// By how much its control may grow in a second.
+    /// By how much its control may grow in a second [unit of the feature per s²].
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(crate) rise: Option<f64>,
     /// The port that is measured, before its filters.

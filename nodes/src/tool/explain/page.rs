@@ -119,7 +119,10 @@ fn scheduled(feature: &Feature, schedule: &Schedule) -> String {
 fn rising(feature: &Feature) -> Option<String> {
     let (pid, rise) = (feature.pid.as_ref()?, feature.rise?);
     let (name, rise) = (&feature.name, number(rise));
-    Some(format!("`{pid}` lets the control of `{name}` grow by {rise} in a second: large errors are reduced later.\n"))
+    Some(format!(
+        "`{pid}` lets the control of `{name}` grow by at most {rise} per s2, in the unit of `{name}`: a large error is \
+         reduced later than by kp alone.\n"
+    ))
 }
 
 /// Says what else answers the same measurement.
