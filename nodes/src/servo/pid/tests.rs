@@ -222,7 +222,7 @@ fn the_control_grows_as_fast_as_it_may_and_falls_at_once() {
 
 #[test]
 fn noise_at_rest_has_the_same_gain_with_and_without_a_rise_at_any_rate() {
-    // A step of the noise of 0.1 mm in each sample, at 1 kHz and at 100 Hz.
+    // Noise of up to 0.1 mm, at 1 kHz and at 100 Hz.
     let noise = |k: i32| 1e-4 * f64::from(k * 7919 % 13 - 6) / 6.0;
     for ms in [1.0, 10.0] {
         let mut rigs = ["kp = 3.5", "kp = 3.5, rise = 0.15"].map(|gains| one(Unit::METRE, gains));
@@ -246,7 +246,7 @@ fn while_the_control_grows_the_integral_does_not_wind_up() {
 
 proptest! {
     #[test]
-    fn the_control_never_grows_faster(
+    fn the_control_never_grows_faster_than_its_rise(
         errors in proptest::collection::vec(-5.0_f64..5.0, 1..60),
         gains in prop::sample::select(vec!["kp = 1.0", "ki = 20.0", "kp = 3.0, ki = 9.0, kd = 0.01, limit = 0.02"]),
     ) {
