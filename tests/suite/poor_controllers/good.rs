@@ -244,6 +244,38 @@ pub(super) fn good_by_turns() -> Vec<Variant> {
                 "set modes.servo.go={ to = \"approach\", when = \"kept.value\", above = 0.05, for_ms = 100 }",
             ],
         ),
+        // An integral in a mode that a large error ends, as `within` would.
+        variant(
+            "edge",
+            &[
+                "gains.pressure = { kp = 0.4 }",
+                "set modes.servo.go={ to = \"trim\", when = \"error.error.pressure\", within = 0.01, for_ms = 500 }",
+                "set modes.trim.set.pid.gains.pressure.ki=0.06",
+                "set modes.trim.go={ to = \"servo\", when = \"error.error.pressure\", above = 0.02, for_ms = 20 }",
+                "set modes.trim.on_lost={ of = \"touch.present\", after_ms = 100, to = \"approach\" }",
+            ],
+        ),
+        // It lets go by its control, and moves away then.
+        variant(
+            "edge",
+            &[
+                "set modes.servo.set.error.setpoint.pressure=0.0",
+                "set modes.servo.on_lost.to=\"away\"",
+                "set modes.away.set.projector.select=[0, 0, 0, 0, 0, 0]",
+                "set modes.away.set.reach.twist=[0, 0, -0.01, 0, 0, 0]",
+                "set modes.away.done={ after_travel_mm = 10, of = \"move.sensor_pose\" }",
+            ],
+        ),
+        // It searches a lost contact along the object, as fast as it approached.
+        Variant {
+            task: "hybrid",
+            bench: None,
+            changes: [&search("0.008")[..], &["set modes.search.set.reach.twist=[0.008, 0, 0, 0, 0, 0]".to_owned()]]
+                .concat(),
+        },
+        // Rolling that couples the axes a little, and a press that slides a little.
+        variant("rolling", &["columns.x = [-1, 0, 0, 5, -20, 0]"]),
+        variant("hybrid", &["columns.pressure = [0.3, 0, 1, 0, 0, 0]"]),
         // It waits at rest until it is touched, and approaches in another mode.
         variant(
             "force",

@@ -66,8 +66,108 @@ pub(super) fn wrong_columns() -> Vec<(&'static str, Variant)> {
         variant("finger_press", &["columns.pressure = [0, 0, -0.0005, 0, 0, 0]"]),
         variant("two_arms", &["set parts.left.set.jacobian.columns.x=[1, 0, 0, 0, 20, 0]"]),
         variant("carry", &["set parts.left.set.jacobian.columns.force=[0, 0, -0.004, 0, 0, 0]"]),
+        // Turned by 80 degrees, turned by 100 degrees, rolled along the other axis, and slid instead of pressed.
+        variant("hybrid", &["columns.x = [-0.17, -0.98, 0, 0, 0, 0]"]),
+        variant("hybrid", &["columns.x = [0, -0.98, 0, 0, 0, 0]", "columns.y = [0.98, 0, 0, 0, 0, 0]"]),
+        variant("rolling", &["columns.x = [-1, 0, 0, -20, 0, 0]"]),
+        variant("hybrid", &["columns.pressure = [3, 0, 1, 0, 0, 0]"]),
+        // The offset of a line grows toward its direction turned by 90 degrees: here along -x.
+        with_feature(
+            "cable",
+            "offset",
+            "line2.offset",
+            "[-1, 0, 0, 0, 0, 0]",
+            &[
+                "set nodes.line2.type=\"hough\"",
+                "set nodes.line2.in.image=\"touch.repaired\"",
+                "set nodes.line2.in.region=\"middle.region\"",
+                "set nodes.error.setpoint.orientation=1.2",
+                "select = [1, 0, 1, 0, 0, 1]",
+            ],
+        ),
+        with_feature("hold_without_slip", "fx", "shear.fx", "[0.01, 0, 0, 0, 0, 0]", &["select = [1, 0, 1, 0, 0, 0]"]),
+        with_feature(
+            "edge",
+            "area",
+            "size.area",
+            "[0, 0, -0.001, 0, 0, 0]",
+            &[
+                "set nodes.size.type=\"contact_area\"",
+                "set nodes.size.in.image=\"touch.repaired\"",
+                "set nodes.size.in.region=\"touch.region\"",
+            ],
+        ),
     ];
     cases.into_iter().map(|variant| ("wrong-column", variant)).collect()
+}
+
+/// A task that controls a feature more, with a setpoint of 0 and a gain of 1 1/s.
+fn with_feature(task: &'static str, name: &str, port: &str, column: &str, changes: &[&str]) -> Variant {
+    let more = [
+        format!("set nodes.error.in.{name}={port:?}"),
+        format!("set nodes.error.setpoint.{name}=0.0"),
+        format!("set nodes.pid.gains.{name}.kp=1.0"),
+        format!("set nodes.jacobian.columns.{name}={column}"),
+    ];
+    let changes = changes.iter().map(|change| (*change).to_owned()).chain(more).collect();
+    Variant { task, bench: None, changes }
+}
+
+/// Forces, places and errors that a mode never reaches, and loops that never get there.
+pub(super) fn never_reached() -> Vec<(&'static str, Variant)> {
+    let band = |feature: &str, width: &str, inside: &str| {
+        [
+            "set nodes.band.type=\"deadband\"".to_owned(),
+            "set nodes.band.in.error=\"error.error\"".to_owned(),
+            format!("set nodes.band.width.{feature}={width}"),
+            format!("set nodes.band.inside={inside:?}"),
+            "set nodes.pid.in.error=\"band.error\"".to_owned(),
+        ]
+    };
+    let banded = |task, changes: [String; 5]| Variant { task, bench: None, changes: changes.into() };
+    let window = [
+        "set nodes.box.type=\"image_window\"",
+        "set nodes.box.in.region=\"touch.region\"",
+        "set nodes.box.size=[0.02, 0.08]",
+        "set nodes.place.type=\"moments\"",
+        "set nodes.place.in.image=\"touch.repaired\"",
+        "set nodes.place.in.region=\"box.region\"",
+        "set nodes.error.in.x=\"place.x\"",
+        "set nodes.error.setpoint.x=0.015",
+    ];
+    vec![
+        ("unreachable-setpoint", banded("edge", band("pressure", "{ inner = 0.05, outer = 0.2 }", "absent"))),
+        ("unreachable-setpoint", banded("position", band("x", "{ inner = 0.05, outer = 0.06 }", "absent"))),
+        ("windup", banded("edge", band("orientation", "{ inner = 0.01, outer = 0.02 }", "zero"))),
+        ("unreachable-setpoint", variant("position", &window)),
+        (
+            "unreachable-setpoint",
+            variant(
+                "force",
+                &["set modes.servo.go={ to = \"approach\", when = \"touch.force\", above = 25.0, for_ms = 100 }"],
+            ),
+        ),
+        ("unreachable-setpoint", variant("force", &["set parts.touch.set.label.min_force=16.0"])),
+        ("unusual-gain", variant("rolling", &["gains.x = { kp = 2.0, limit = 0.0001 }"])),
+        ("unusual-gain", variant("edge", &["gains.pressure = { kd = 0.05 }"])),
+        ("unusual-gain", variant("hybrid", &["columns.x = [-0.001, 0, 0, 0, 0, 0]"])),
+        (
+            "unusual-gain",
+            variant("edge", &["gains.orientation = { kp = 7.0, ki = 7.0, within = 0.05, limit = 0.002 }"]),
+        ),
+        (
+            "unused-column",
+            variant(
+                "cable",
+                &[
+                    "set nodes.line2.type=\"curvature\"",
+                    "set nodes.line2.in.image=\"touch.repaired\"",
+                    "set nodes.line2.in.region=\"middle.region\"",
+                    "set nodes.bend.in.value=\"line2.rate\"",
+                ],
+            ),
+        ),
+    ]
 }
 
 /// Gains, filters and setpoints.
@@ -119,6 +219,8 @@ pub(super) fn poor_gains() -> Vec<(&'static str, Variant)> {
 /// Projectors and modes.
 pub(super) fn poor_modes() -> Vec<(&'static str, Variant)> {
     let searching = |task: &'static str| Variant { task, bench: None, changes: search("0.03") };
+    let mut swept = searching("hybrid");
+    swept.changes.push("set modes.search.set.reach.twist=[0.03, 0, 0, 0, 0, 0]".into());
     let after_a_clearance =
         Variant { task: "hybrid", bench: None, changes: [search("0.03"), cleared("-0.01")].concat() };
     vec![
@@ -141,6 +243,9 @@ pub(super) fn poor_modes() -> Vec<(&'static str, Variant)> {
         ("fast-recovery", searching("hybrid")),
         ("fast-recovery", searching("edge")),
         ("fast-recovery", after_a_clearance),
+        // A sweep along the object, and a press that begins with a contact.
+        ("fast-recovery", swept),
+        ("fast-recovery", variant("position", &["set modes.servo.on_lost.to=\"press\""])),
         ("unused-column", variant("hybrid", &["columns.y = [0.8, -1, 0, 20, 0, 0]", "select = [1, 0, 1, 0, 0, 0]"])),
     ]
 }
@@ -203,6 +308,21 @@ pub(super) fn poor_sums() -> Vec<(&'static str, Variant)> {
             ),
         ),
         ("unused-column", gated_above("4.0")),
+        ("unused-column", gated_above("0.25")),
+        // Two controllers of forces that press together.
+        (
+            "low-margin",
+            with_feature(
+                "edge",
+                "force",
+                "touch.force",
+                "[0, 0, 0.02, 0, 0, 0]",
+                &[
+                    "set facts.arm.contacts=[{ object = \"pen\", pressure = { vz = 3.5, resonance_hz = 6.0, latency_ms = 18.0 }, force = { vz = 175.0, resonance_hz = 6.0, latency_ms = 18.0 } }]",
+                    "gains.pressure = { kp = 2.0 }",
+                ],
+            ),
+        ),
     ]
 }
 
@@ -223,6 +343,23 @@ pub(super) fn opposed() -> Vec<(&'static str, Variant)> {
             ),
         ),
         ("opposed-motion", variant("square", &["set modes.retreat.set.reach.twist=[0, 0, 0.015, 0, 0, 0]"])),
+        ("opposed-motion", variant("square", &["set nodes.path.in_plane=false"])),
+        ("opposed-motion", variant("edge", &["set modes.servo.set.reach.twist=[0, 0, 0.02, 0, 0, 0]"])),
+        (
+            "opposed-motion",
+            with_feature(
+                "edge",
+                "force",
+                "touch.force",
+                "[0, 0, 0.001, 0, 0, 0]",
+                &["set nodes.pid.gains.force.ki=0.2", "set nodes.pid.gains.force.within=0.5"],
+            ),
+        ),
+        // The line is turned to y, and longer than the pad.
+        (
+            "line-position",
+            with_feature("edge", "y", "touch.y", "[0, -1, 0, 0, 0, 0]", &["select = [0, 1, 1, 0, 0, 1]"]),
+        ),
         // The motion of the approach passes a projector that selects nothing then.
         (
             "no-approach",

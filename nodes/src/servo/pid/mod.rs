@@ -62,6 +62,8 @@ pub struct Params {
 const MAX_STABLE_STEP: f64 = 2.0;
 /// A small error, in the unit of any feature: what a `rise` must answer as fast as kp says.
 const SMALL_ERROR: f64 = 0.001;
+/// An error within the noise of each feature [E].
+const TINY_ERROR: f64 = 0.0001;
 
 /// Gains of one feature.
 #[derive(Debug, Clone, Param)]
@@ -103,9 +105,12 @@ impl Gains {
             return Some(warn(Code::UnusualGain, gain, message)?.help(help));
         }
         // A feature without any gain rests. Whether another mode gives it one is not known here.
-        if self.kp == 0.0 && self.ki > 0.0 {
-            let message =
-                format!("the gain `kp` of `{name}` is 0 1/s: the integral alone corrects the error, and swings");
+        if self.kp == 0.0 && (self.ki > 0.0 || self.kd > 0.0) {
+            let why = match self.ki > 0.0 {
+                true => "the integral alone corrects the error, and swings",
+                false => "the derivative alone corrects no error that stays",
+            };
+            let message = format!("the gain `kp` of `{name}` is 0 1/s: {why}");
             let help = format!("write a gain greater than 0, or remove the wire of `{name}` to stop controlling it");
             return Some(warn(Code::UnusualGain, "kp", message)?.help(help));
         }
@@ -117,6 +122,15 @@ impl Gains {
             );
             let help = format!("write `rise = {:.2}` or more, or remove it", 10.0 * self.kp * self.kp * SMALL_ERROR);
             return Some(warn(Code::UnusualGain, "rise", message)?.help(help));
+        }
+        if let Some(limit) = self.limit.filter(|limit| *limit < self.kp * TINY_ERROR) {
+            let (unit, error) = (feature.unit, limit / self.kp);
+            let message = format!(
+                "the control of `{name}` is at its limit of {limit} {unit}/s from an error of {error:.1e} {unit} on: noise \
+                 alone decides in which direction it moves"
+            );
+            let help = format!("write `limit = {:.4}` or more, or remove it", 10.0 * self.kp * SMALL_ERROR);
+            return Some(warn(Code::UnusualGain, "limit", message)?.help(help));
         }
         let (step, max) = (self.kp * period, MAX_STABLE_STEP / period);
         if step < MAX_STABLE_STEP {

@@ -406,16 +406,19 @@ fn gains_and_features_must_agree() {
 #[test]
 fn gains_that_do_not_reduce_the_error_are_warned_of() {
     let wires = [("error", Shape::from(shape(&[("x", Unit::METRE)])))];
-    let cases: [(&str, &[&str]); 11] = [
+    let cases: [(&str, &[&str]); 14] = [
         ("{ kp = 2.0, ki = 0.1, kd = 0.0 }", &[]),
         ("{ kp = 1999.0 }", &[]),
         ("{ kp = 2000.0 }", &["unstable-gain: `gains.x.kp`"]),
         ("{ kp = 0.0 }", &[]),
         ("{}", &[]),
+        ("{ kd = 0.1 }", &["unusual-gain: `gains.x.kp`"]),
         ("{ kp = 0, ki = 0.1 }", &["unusual-gain: `gains.x.kp`"]),
         ("{ kp = -2.0 }", &["unusual-gain: `gains.x.kp`"]),
         ("{ kp = 2.0, ki = -0.1 }", &["unusual-gain: `gains.x.ki`"]),
         ("{ kp = 2.0, kd = -0.1 }", &["unusual-gain: `gains.x.kd`"]),
+        ("{ kp = 2.0, limit = 0.0002 }", &[]),
+        ("{ kp = 2.0, limit = 0.00019 }", &["unusual-gain: `gains.x.limit`"]),
         ("{ kp = 2.0, rise = 0.0041 }", &[]),
         ("{ kp = 2.0, rise = 0.0039 }", &["unusual-gain: `gains.x.rise`"]),
     ];

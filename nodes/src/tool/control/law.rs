@@ -52,7 +52,7 @@ pub(crate) struct Feature {
     /// What multiplies all three gains, depending on the contact.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub(crate) schedules: Vec<Schedule>,
-    /// What else moves the arm by the same measurement: its loop adds to this one.
+    /// What else moves the arm by the same measurement, or presses by another one: its loop adds to this one.
     #[serde(skip)]
     pub(crate) beside: Vec<Self>,
 }
@@ -107,6 +107,11 @@ impl Feature {
         self.has_gain() && self.column.iter().any(|entry| *entry != 0.0)
     }
 
+    /// Returns whether it presses, and moves the sensor in no other way.
+    pub(crate) fn presses_alone(&self) -> bool {
+        (0..6).all(|i| (self.column[i] != 0.0) == (i == 2))
+    }
+
     /// Returns the name of what is measured, as a bench states it.
     pub(crate) fn quantity(&self) -> Option<&str> {
         self.measured.as_ref()?.rsplit('.').next()
@@ -131,7 +136,7 @@ impl Feature {
         self.pid == other.pid && self.name == other.name && self.takes_the_way_of(other)
     }
 
-    /// Returns whether another feature moves the arm by the same measurement at the same time.
+    /// Returns whether another feature moves the arm by the same measurement at the same time, or presses by another one.
     pub(super) fn is_beside(&self, nodes: &Nodes<'_>, other: &Self) -> bool {
         let is_other_side = |(switch, side): &(String, usize)| {
             self.sides.iter().any(|(own, own_side)| own == switch && own_side != side)
@@ -141,7 +146,7 @@ impl Feature {
         let own_gate = |one: &Self, two: &Self| one.gates.iter().any(|gate| !two.gates.contains(gate));
         other.moves()
             && other.measured.is_some()
-            && other.measured == self.measured
+            && (other.measured == self.measured || self.presses_alone() && other.presses_alone())
             && !other.sides.iter().any(is_other_side)
             && !other.gates.iter().any(closes)
             && !(own_gate(self, other) && own_gate(other, self))

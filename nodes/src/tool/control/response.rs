@@ -29,7 +29,7 @@ pub(crate) struct Loop {
     pub(crate) period: f64,
     /// What was measured, as a multiple of the model, at circular frequencies from low to high [rad/s]; empty if nothing was.
     measured: Vec<(f64, Complex<f64>)>,
-    /// Loops of the same measurement, which add to this one.
+    /// Loops of the same measurement, or through the same motion, which add to this one.
     beside: Vec<Self>,
 }
 
@@ -50,9 +50,13 @@ impl Loop {
         for other in others {
             let other = Feature { beside: Vec::new(), ..other.clone() };
             // One that only moves what does not change the feature adds nothing.
-            if answer.along(&other.column) != 0.0 {
-                beside.push(Self::over(&other, contact, period)?);
+            let around = Self::over(&other, contact, period).filter(|_| answer.along(&other.column) != 0.0);
+            // Of another measurement nothing may be known.
+            let is_needed = answer.along(&other.column) != 0.0 && other.measured == feature.measured;
+            if is_needed && around.is_none() {
+                return None;
             }
+            beside.extend(around);
         }
         (around.gain != 0.0).then_some(Self { beside, ..around.times(factor) })
     }
@@ -70,6 +74,11 @@ impl Loop {
     pub(crate) fn times(&self, factor: f64) -> Self {
         let [kp, ki, kd] = [self.kp, self.ki, self.kd].map(|gain| gain * factor);
         Self { kp, ki, kd, ..self.clone() }
+    }
+
+    /// Returns the same loop without the derivative of its own controller.
+    pub(crate) fn without_derivative(&self) -> Self {
+        Self { kd: 0.0, ..self.clone() }
     }
 
     /// Returns the same loop as it was measured: as a multiple of the model, at circular frequencies from low to high

@@ -125,7 +125,7 @@ fn rising(feature: &Feature) -> Option<String> {
     ))
 }
 
-/// Says what else answers the same measurement.
+/// Says what else answers the same measurement, or presses too.
 fn together(feature: &Feature) -> Option<String> {
     let measured = feature.measured.as_ref().filter(|_| !feature.beside.is_empty())?;
     // Once for all that answer it.
@@ -135,9 +135,9 @@ fn together(feature: &Feature) -> Option<String> {
     let others: Vec<String> =
         feature.beside.iter().map(|other| format!("`{}` of `{}`", other.name, other.jacobian)).collect();
     let (name, jacobian, others) = (&feature.name, &feature.jacobian, others.join(" and "));
-    Some(format!(
-        "`{name}` of `{jacobian}` and {others} answer `{measured}` together: their margins are those of the sum.\n"
-    ))
+    let is_same = feature.beside.iter().all(|other| other.measured == feature.measured);
+    let what = if is_same { format!("answer `{measured}`") } else { "move `vz`".into() };
+    Some(format!("`{name}` of `{jacobian}` and {others} {what} together: their margins are those of the sum.\n"))
 }
 
 fn approach(approach: &Approach) -> String {

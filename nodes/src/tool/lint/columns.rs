@@ -1,11 +1,11 @@
 //! Columns: those that increase an error, those that change another feature, and those that nothing uses.
 
 use std::collections::BTreeSet;
-use std::f64::consts::{FRAC_PI_2, PI};
 
 use tactflow_runtime::graph::OutlinedBlock;
 use tactflow_runtime::source::{Code, Diagnostic, Diagnostics, Edit, Item};
 
+use super::lines::{line_angle, line_axis};
 use super::rows::{Answer, Row};
 use super::{Controlled, ModeLaw};
 use crate::motion::COMPONENTS;
@@ -14,8 +14,6 @@ use crate::tool::control::contacts::Contact;
 use crate::tool::control::law::{Feature, Law};
 use crate::tool::control::settings::{Nodes, source};
 
-/// Largest angle between a line and an axis of the sensor along which the line lies [rad].
-const ALONG: f64 = 0.35;
 /// Largest radius of an object that a pad rolls on [m].
 const LARGEST_RADIUS: f64 = 0.1;
 
@@ -30,14 +28,17 @@ pub(super) fn check(arm: &Controlled<'_>, found: &mut Diagnostics) {
 /// Returns the warning about a column that increases the error of its feature, or that does not change the feature.
 fn wrong(arm: &Controlled<'_>, mode: &ModeLaw<'_>, feature: &Feature) -> Option<Diagnostic> {
     let Some((quantity, row)) = mode.quantity(feature).and_then(|quantity| Some((quantity, Row::of(quantity)?))) else {
-        return reversed(arm, mode, feature);
+        return offset(mode, feature).or_else(|| reversed(arm, mode, feature));
     };
     let column = mode.column(feature)?;
     if !row.changes(&column) {
-        return foreign(mode, feature, quantity, column);
+        return row.is_needed.then(|| foreign(mode, feature, quantity, column)).flatten();
     }
     if !row.changes(&feature.column) {
-        return Some(blocked(mode, feature, &row));
+        return row.is_needed.then(|| blocked(mode, feature, &row));
+    }
+    if let Some(aside) = aside(mode, feature, quantity, column) {
+        return Some(aside);
     }
     let is_reversed = |answer: &&Answer| {
         // What the bench says about this object counts more than geometry.
@@ -50,14 +51,60 @@ fn wrong(arm: &Controlled<'_>, mode: &ModeLaw<'_>, feature: &Feature) -> Option<
     let Some(first) = row.known.iter().find(is_reversed) else { return reversed(arm, mode, feature) };
     let name = COMPONENTS[first.component];
     // Of what is not selected, too.
-    let mut right = column;
-    for answer in row.known {
-        right[answer.component] = answer.sign * column[answer.component].abs();
-    }
+    let right = row.signed(column);
     let message = format!(
         "the column of `{}` increases its error: `{name}` is {}, but {}",
         feature.name, column[first.component], first.reason
     );
+    Some(replaced(mode, feature, message, right))
+}
+
+/// The components that move a contact along x and along y: by sliding, and by rolling.
+const ALONG_X_AND_Y: [[usize; 2]; 2] = [[0, 1], [4, 3]];
+
+/// Returns the warning about a column that slides or rolls a contact more along the other axis than along its own, or that
+/// slides it more than it presses. With two such columns the contact circles around its setpoint, or runs away from it.
+fn aside(mode: &ModeLaw<'_>, feature: &Feature, quantity: &str, column: [f64; 6]) -> Option<Diagnostic> {
+    let name = &feature.name;
+    let pairs: &[[usize; 2]] = match quantity {
+        "x" => &ALONG_X_AND_Y,
+        "y" => &[[1, 0], [3, 4]],
+        "pressure" | "force" => &[[2, 0], [2, 1]],
+        _ => return None,
+    };
+    let is_aside = |pair: &&[usize; 2]| feature.column[pair[1]].abs() > feature.column[pair[0]].abs();
+    let [own, other] = *pairs.iter().find(is_aside)?;
+    let mut right = column;
+    for [own, other] in pairs {
+        let known = Row::of(quantity)?.known.iter().find(|answer| answer.component == *own)?;
+        let size = if *own == 2 { column[*own].abs() } else { column[*own].hypot(column[*other]) };
+        (right[*own], right[*other]) = (known.sign * (size * 1e3).round() / 1e3, 0.0);
+    }
+    let message = format!(
+        "the column of `{name}` moves the sensor more with `{}`, which does not change `{quantity}`, than with `{}`, which does",
+        COMPONENTS[other], COMPONENTS[own]
+    );
+    Some(replaced(mode, feature, message, right))
+}
+
+/// Returns the warning about a column that increases the offset of a line. The direction of the line is the setpoint of
+/// its angle, and the offset is positive on the side of the direction turned by +90 degrees.
+fn offset(mode: &ModeLaw<'_>, feature: &Feature) -> Option<Diagnostic> {
+    if mode.quantity(feature)? != "offset" {
+        return None;
+    }
+    let angle = line_angle(mode)?;
+    let (across_x, across_y) = (libm::sin(angle), -libm::cos(angle));
+    let column = mode.column(feature)?;
+    if across_x * feature.column[0] + across_y * feature.column[1] >= 0.0 {
+        return None;
+    }
+    let message = format!(
+        "the column of `{}` increases its error: the offset of a line at {angle} rad grows when the sensor moves along ({:.2}, {:.2})",
+        feature.name, across_x, across_y
+    );
+    let mut right = column;
+    (right[0], right[1]) = (-column[0] + 0.0, -column[1] + 0.0);
     Some(replaced(mode, feature, message, right))
 }
 
@@ -123,18 +170,19 @@ fn foreign(mode: &ModeLaw<'_>, feature: &Feature, quantity: &str, column: [f64; 
         );
         // The second one of the pair would say the same.
         let is_second = mode.place_of_column(other).start < mode.place_of_column(feature).start;
-        let diagnostic = replaced(mode, feature, message, other_column);
+        let (own, others) = (row.signed(other_column), Row::of(mode.quantity(other)?)?.signed(column));
+        let diagnostic = replaced(mode, feature, message, own);
         let place = mode.place_of_column(other);
         let is_shown = other.moves();
         return (!is_second || !is_shown).then(|| {
             let help = format!(
                 "exchange them: `columns.{} = {}` and `columns.{} = {}`",
                 feature.name,
-                array(&other_column),
+                array(&own),
                 other.name,
-                array(&column)
+                array(&others)
             );
-            let edit = Edit::Replace(place.clone(), array(&column));
+            let edit = Edit::Replace(place.clone(), array(&others));
             diagnostic.edit(edit).help(help).note(place, "the other column")
         });
     }
@@ -288,25 +336,4 @@ fn is_watched(arm: &Controlled<'_>, feature: &Feature) -> bool {
 fn is_along_line(arm: &Controlled<'_>, feature: &Feature) -> bool {
     let is_along = |mode: &ModeLaw<'_>| line_axis(mode).is_some_and(|axis| mode.quantity(feature) == Some(axis));
     arm.modes.iter().any(is_along)
-}
-
-/// Returns the position along the line that a mode holds at an angle, `x` or `y`; `None` without a line, or if it lies
-/// along neither axis.
-fn line_axis(mode: &ModeLaw<'_>) -> Option<&'static str> {
-    match line_positions(mode)[..] {
-        [axis] => Some(axis),
-        _ => None,
-    }
-}
-
-/// Returns the positions that change along the line that a mode holds at an angle: both, if it lies along neither axis,
-/// and none without a line.
-pub(super) fn line_positions(mode: &ModeLaw<'_>) -> Vec<&'static str> {
-    let mut lines = mode.moving().filter(|feature| mode.quantity(feature) == Some("orientation"));
-    let Some(angle) = lines.find_map(|feature| feature.setpoint) else { return Vec::new() };
-    match angle.rem_euclid(PI) {
-        angle if (angle - FRAC_PI_2).abs() < ALONG => vec!["y"],
-        angle if !(ALONG..=PI - ALONG).contains(&angle) => vec!["x"],
-        _ => vec!["x", "y"],
-    }
 }

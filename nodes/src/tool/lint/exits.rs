@@ -45,20 +45,30 @@ impl ModeLaw<'_> {
 
     /// Returns whether an exit waits for a contact.
     pub(super) fn waits_for_contact(&self) -> bool {
-        let is_found =
-            |exit: &Exit<'_>| exit.word("when").is_some_and(|port| port.ends_with(".present")) && !exit.is_lost();
-        self.exits("go").any(|exit| is_found(&exit))
+        self.exits("go").any(|exit| exit.is_found())
     }
 }
 
 impl Exit<'_> {
     /// Returns whether a `go` waits until there is no contact.
     pub(super) fn is_lost(&self) -> bool {
-        let is_contact = self.word("when").is_some_and(|port| port.ends_with(".present"));
-        is_contact && matches!(self.word("is"), Some("false" | "absent"))
+        self.is_of_contact() && matches!(self.word("is"), Some("false" | "absent"))
     }
 
-    fn word(&self, key: &str) -> Option<&str> {
+    /// Returns whether a `go` waits for a contact.
+    pub(super) fn is_found(&self) -> bool {
+        self.is_of_contact() && !self.is_lost()
+    }
+
+    fn is_of_contact(&self) -> bool {
+        self.word("when").is_some_and(|port| port.ends_with(".present"))
+    }
+
+    pub(super) fn word(&self, key: &str) -> Option<&str> {
         self.value.as_table()?.get(key)?.as_str()
+    }
+
+    pub(super) fn number(&self, key: &str) -> Option<f64> {
+        self.value.as_table()?.get(key)?.read()
     }
 }

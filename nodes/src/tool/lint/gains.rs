@@ -2,16 +2,18 @@
 
 use std::f64::consts::FRAC_PI_2;
 
-use tactflow_runtime::source::{Code, Diagnostic, Diagnostics};
+use tactflow_runtime::source::{Code, Diagnostic, Diagnostics, Edit};
 
-use super::modes::{force_limit, setpoint};
+use super::reach::{deadband, force_limit, setpoint};
 use super::{Controlled, ModeLaw};
+use crate::tool::control::contacts::Answer;
 use crate::tool::control::law::Feature;
 
 pub(super) fn check(arm: &Controlled<'_>, found: &mut Diagnostics) {
     for mode in &arm.modes {
         found.extend(mode.moving().filter_map(|feature| unfiltered(mode, feature)));
-        found.extend(mode.moving().filter_map(|feature| windup(arm, mode, feature)));
+        found.extend(mode.moving().filter_map(|feature| slow(arm, mode, feature)));
+        found.extend(mode.moving().filter_map(|feature| hunting(mode, feature).or_else(|| windup(arm, mode, feature))));
     }
     let first = arm.modes.first().into_iter();
     found.extend(first.flat_map(|mode| mode.law.features.iter().filter_map(|feature| resting(arm, mode, feature))));
@@ -26,6 +28,50 @@ fn resting(arm: &Controlled<'_>, mode: &ModeLaw<'_>, feature: &Feature) -> Optio
     let message = format!("the gain `kp` of `{name}` is 0 1/s: nothing corrects the error");
     let help = format!("write a gain greater than 0, or remove the wire of `{name}` to stop controlling it");
     Some(Diagnostic::new(Code::UnusualGain, mode.place_of_gain(feature, "kp"), message).help(help))
+}
+
+/// Gain of a loop that needs a minute for two thirds of an error [1/s].
+const SLOW: f64 = 1.0 / 60.0;
+
+/// Returns the warning about a loop that hardly corrects an error: its column is in another unit, or its control has a
+/// limit that is too small.
+fn slow(arm: &Controlled<'_>, mode: &ModeLaw<'_>, feature: &Feature) -> Option<Diagnostic> {
+    let quantity = mode.quantity(feature)?;
+    let geometry = Answer::of_geometry(quantity);
+    let answers = arm.contacts.iter().filter_map(|contact| contact.features.get(quantity)).chain(&geometry);
+    let gain = answers.map(|answer| answer.along(&feature.column)).fold(0.0, f64::max);
+    let rate = feature.kp * gain;
+    if let Some(limited) = limited(mode, feature, quantity, gain) {
+        return Some(limited);
+    }
+    if rate <= 0.0 || rate >= SLOW || feature.ki > 0.0 || !feature.beside.is_empty() {
+        return None;
+    }
+    let (name, time) = (&feature.name, (1.0 / rate).round());
+    let message = format!("the loop of `{name}` takes {time} s for two thirds of an error: it hardly moves the sensor");
+    let help =
+        format!("write a larger `kp` of `{name}`, or check the unit of its column: it moves the sensor in m and rad");
+    Some(Diagnostic::new(Code::UnusualGain, mode.place_of_column(feature), message).help(help))
+}
+
+/// Returns the warning about a limit with which a usual error takes minutes.
+fn limited(mode: &ModeLaw<'_>, feature: &Feature, quantity: &str, gain: f64) -> Option<Diagnostic> {
+    let (usual, unit) = match quantity {
+        "x" | "y" => (0.01, "m"),
+        "orientation" => (0.5, "rad"),
+        _ => return None,
+    };
+    let limit = mode.limit(feature).filter(|limit| limit * gain > 0.0)?;
+    let time = usual / (limit * gain);
+    if time * SLOW <= 1.0 {
+        return None;
+    }
+    let (name, place) = (&feature.name, mode.place_of_gain(feature, "limit"));
+    let message = format!(
+        "the control of `{name}` has a limit of {limit} {unit}/s: an error of {usual} {unit} takes {time:.0} s"
+    );
+    let help = format!("write a `limit` of {} {unit}/s or more, or remove it", usual);
+    Some(Diagnostic::new(Code::UnusualGain, place, message).help(help))
 }
 
 /// Returns the warning about a derivative of a feature that no filter smooths.
@@ -59,16 +105,38 @@ fn largest_error(arm: &Controlled<'_>, mode: &ModeLaw<'_>, feature: &Feature) ->
             let most = force_limit(arm, mode, quantity).map_or(f64::INFINITY, |(most, _)| most);
             feature.setpoint.filter(|setpoint| *setpoint > 0.0).map_or(most, |setpoint| most.min(setpoint))
         }
-        _ => range(mode, feature).unwrap_or(f64::INFINITY),
+        _ => mode.farthest(feature).unwrap_or(f64::INFINITY),
     }
 }
 
-/// Returns the largest distance of a measurement from its setpoint, where its node states the range of its values.
-fn range(mode: &ModeLaw<'_>, feature: &Feature) -> Option<f64> {
-    let port = feature.measured.as_deref()?;
-    let [min, max] = mode.nodes.writer(port)?.outputs.iter().find(|output| output.name == port)?.range?;
-    let setpoint = feature.setpoint?;
-    Some((setpoint - min).max(max - setpoint))
+/// Returns the warning about an integral that goes on to move its feature while a deadband lets it rest.
+fn hunting(mode: &ModeLaw<'_>, feature: &Feature) -> Option<Diagnostic> {
+    let (name, band) = (&feature.name, deadband(mode, feature)?);
+    mode.nodes.number(band, &format!("width.{name}.outer"))?;
+    let inside = mode.nodes.value(band, "inside")?;
+    if feature.ki == 0.0 || inside.value.as_str() != Some("zero") {
+        return None;
+    }
+    let message = format!(
+        "`{}` makes a small error of `{name}` zero, but its integral stays: it moves `{name}` through the band and out at the \
+         other side",
+        band.name
+    );
+    let (place, right) = (inside.value.span.clone(), "\"absent\"");
+    let diagnostic = Diagnostic::new(Code::Windup, place.clone(), message);
+    Some(diagnostic.help(format!("write `inside = {right}`")).edit(Edit::Replace(place, right.into())))
+}
+
+/// Returns the error at which a mode is left for one in which the feature has no integral.
+fn left_at(arm: &Controlled<'_>, mode: &ModeLaw<'_>, feature: &Feature) -> Option<f64> {
+    let error = format!("{}.error.{}", feature.compared.as_ref()?, feature.name);
+    let rests = |name: &str| {
+        let other = arm.modes.iter().find(|mode| mode.own_name() == name);
+        let mut features = other.into_iter().flat_map(|mode| &mode.law.features);
+        features.any(|one| one.id() == feature.id() && one.ki == 0.0)
+    };
+    let mut exits = mode.exits("go").filter(|exit| exit.word("when").is_some_and(|port| error.ends_with(port)));
+    exits.find(|exit| rests(exit.to))?.number("above")
 }
 
 /// Returns the warning about an integral that grows at every error, up to a motion at full speed.
@@ -79,7 +147,9 @@ fn windup(arm: &Controlled<'_>, mode: &ModeLaw<'_>, feature: &Feature) -> Option
     }
     let pid = mode.nodes.node(feature.pid.as_deref()?)?;
     let number = |key: &str| mode.nodes.number(pid, &format!("gains.{}.{key}", feature.name));
-    if feature.ki == 0.0 || number("within").is_some_and(|within| within < largest_error(arm, mode, feature)) {
+    let is_bound = |error: f64| error < largest_error(arm, mode, feature);
+    if feature.ki == 0.0 || number("within").is_some_and(is_bound) || left_at(arm, mode, feature).is_some_and(is_bound)
+    {
         return None;
     }
     let limiter = arm.limits.iter().find(|limiter| limiter.kind == "twist_limit")?;

@@ -8,9 +8,11 @@
 mod columns;
 mod exits;
 mod gains;
+mod lines;
 mod modes;
 mod opposed;
 mod presence;
+mod reach;
 mod recovery;
 mod rows;
 mod stability;
@@ -66,6 +68,8 @@ pub(crate) fn lint(outline: &Outline, facts: &[(String, toml::Value)]) -> Diagno
         found.extend(unread::misnamed(outline, &arm, name));
         let before = found.len();
         modes::check(&arm, &mut found);
+        reach::check(&arm, &mut found);
+        lines::check(&arm, &mut found);
         opposed::check(&arm, &mut found);
         recovery::check(&arm, &mut found);
         presence::check(&arm, &mut found);
@@ -140,9 +144,22 @@ impl ModeLaw<'_> {
     fn quantity_of<'p>(&self, port: &'p str) -> Option<&'p str> {
         let node = self.nodes.writer(port)?;
         let frame = node.outputs.iter().find(|output| output.name == port)?.frames.first()?.as_deref()?;
-        let is_known = ["moments", "principal_axes", "hough", "curvature"].contains(&&*node.kind.text)
+        let is_known = ["moments", "principal_axes", "hough", "curvature", "shear", "contact_area"]
+            .contains(&&*node.kind.text)
             && self.carried.contains(frame);
         is_known.then(|| port.rsplit('.').next())?
+    }
+
+    /// Returns the smallest and the largest value of what a feature measures, where its node states them.
+    fn range(&self, feature: &Feature) -> Option<[f64; 2]> {
+        let port = feature.measured.as_deref()?;
+        self.nodes.writer(port)?.outputs.iter().find(|output| output.name == port)?.range
+    }
+
+    /// Returns the largest distance of a measurement from its setpoint, where its node states the range of its values.
+    fn farthest(&self, feature: &Feature) -> Option<f64> {
+        let ([min, max], setpoint) = (self.range(feature)?, feature.setpoint?);
+        Some((setpoint - min).max(max - setpoint))
     }
 
     /// Returns the column of a feature before all projectors.
@@ -155,6 +172,12 @@ impl ModeLaw<'_> {
     fn limit(&self, feature: &Feature) -> Option<f64> {
         let pid = self.nodes.node(feature.pid.as_deref()?)?;
         self.nodes.number(pid, &format!("gains.{}.limit", feature.name))
+    }
+
+    /// Returns the error within which the integral of a feature grows.
+    fn within(&self, feature: &Feature) -> Option<f64> {
+        let pid = self.nodes.node(feature.pid.as_deref()?)?;
+        self.nodes.number(pid, &format!("gains.{}.within", feature.name))
     }
 
     /// Returns the place of the column of a feature.

@@ -1,5 +1,4 @@
-//! Modes: rolling without force control, a position along a line, an approach without a motion, and setpoints that a limit
-//! or a threshold keeps a task from.
+//! Modes: rolling without force control, and an approach without a motion.
 
 use std::collections::BTreeSet;
 use std::ops::Range;
@@ -7,24 +6,18 @@ use std::ops::Range;
 use tactflow_runtime::graph::OutlinedBlock;
 use tactflow_runtime::source::{Code, Diagnostic, Diagnostics};
 
-use super::columns::line_positions;
 use super::{Controlled, ModeLaw};
 use crate::motion::COMPONENTS;
-use crate::tool::control::law::{Feature, Guidance};
+use crate::tool::control::law::Feature;
 
 /// Nodes that guide the sensor along the object, and do not press.
 pub(super) const GUIDES: [&str; 6] =
     ["scan_guide", "ridge_guide", "hold_pose", "follow_path", "follow_surface", "park"];
 
-/// Nodes that guide the sensor along a line.
-const LINE_GUIDES: [&str; 2] = ["ridge_guide", "follow_path"];
-
 pub(super) fn check(arm: &Controlled<'_>, found: &mut Diagnostics) {
     for mode in &arm.modes {
         found.extend(rolling(arm, mode));
-        found.extend(along_line(mode));
         found.extend(motionless(arm, mode));
-        found.extend(mode.moving().filter_map(|feature| setpoint(arm, mode, feature)));
     }
 }
 
@@ -50,7 +43,7 @@ fn motionless(arm: &Controlled<'_>, mode: &ModeLaw<'_>) -> Option<Diagnostic> {
 }
 
 /// Returns the nodes that a port depends on.
-fn upstream<'a>(mode: &ModeLaw<'a>, port: &str) -> Vec<&'a OutlinedBlock> {
+pub(super) fn upstream<'a>(mode: &ModeLaw<'a>, port: &str) -> Vec<&'a OutlinedBlock> {
     let mut open: Vec<&OutlinedBlock> = mode.nodes.writer(port).into_iter().collect();
     let (mut seen, mut found) = (BTreeSet::new(), Vec::new());
     while let Some(node) = open.pop() {
@@ -109,98 +102,4 @@ fn roller(mode: &ModeLaw<'_>) -> Option<(String, usize, Range<usize>)> {
         })
     };
     feature.or_else(constant).or_else(generated)
-}
-
-/// Returns the warning about a position that a mode controls along a line, while it moves the sensor along this line.
-///
-/// A task that follows a line moves along it. Where the line is longer than the pad, the middle of its print is that of
-/// the pad, and where it ends, the control of the position works against the motion.
-fn along_line(mode: &ModeLaw<'_>) -> Option<Diagnostic> {
-    let positions = line_positions(mode);
-    let along = |moves: &dyn Fn(usize) -> bool| {
-        let mut axes = positions.iter().map(|axis| usize::from(*axis == "y"));
-        !positions.is_empty() && axes.all(moves)
-    };
-    let mut constants = mode.law.constants.iter().filter(|constant| along(&|i| constant.twist[i] != 0.0));
-    let is_guide =
-        |guide: &&Guidance| LINE_GUIDES.contains(&&*guide.kind) && !mode.rests(guide) && along(&|i| guide.passes[i]);
-    let guide = || mode.law.guidance.iter().find(is_guide).map(Guidance::node);
-    let follower = constants.next().map(|constant| &*constant.node).or_else(guide)?;
-    let held = |i: usize| {
-        let axis = ["x", "y"][i];
-        mode.moving().find(|feature| mode.quantity(feature) == Some(axis) && feature.column[i] != 0.0)
-    };
-    let feature = held(usize::from(positions[0] == "y")).filter(|_| along(&|i| held(i).is_some()))?;
-    let message = format!(
-        "{}`{}` is controlled along the line that `{}` follows: the middle of a long print says nothing about a position \
-         along it",
-        mode.named(),
-        feature.name,
-        follower
-    );
-    let help = match positions[..] {
-        ["x", "y"] => {
-            "let the setpoint of the angle turn the line along `x` or `y`, and control the position across it only"
-                .to_owned()
-        }
-        [axis, ..] => format!("select 0 for `v{axis}` in the projector behind the column of `{}`", feature.name),
-        [] => return None,
-    };
-    Some(Diagnostic::new(Code::LinePosition, mode.place_of_column(feature), message).help(help))
-}
-
-/// Returns the smallest limit of a force, and its key.
-pub(super) fn force_limit(arm: &Controlled<'_>, mode: &ModeLaw<'_>, quantity: &str) -> Option<(f64, String)> {
-    let limit = match quantity {
-        "pressure" => "peak",
-        "force" => "force",
-        _ => return None,
-    };
-    let limiters = arm.limits.iter().filter(|limiter| limiter.kind.ends_with("contact_limit"));
-    let limits = limiters.filter_map(|limiter| {
-        let node = mode.nodes.node(&limiter.node)?;
-        let keys = [format!("{limit}_n"), format!("{limit}_raw")];
-        keys.into_iter().find_map(|key| Some((mode.nodes.number(node, &key)?, key)))
-    });
-    limits.min_by(|(one, _), (other, _)| one.total_cmp(other))
-}
-
-/// Returns the warning about a setpoint of a force that the task never reaches: above a limit, or below what the pad
-/// feels.
-pub(super) fn setpoint(arm: &Controlled<'_>, mode: &ModeLaw<'_>, feature: &Feature) -> Option<Diagnostic> {
-    let (quantity, setpoint) = (mode.quantity(feature)?, feature.setpoint?);
-    let name = &feature.name;
-    let (message, help) = match (force_limit(arm, mode, quantity)?, least_felt(mode, feature)) {
-        ((most, key), _) if setpoint >= most => {
-            let why = if quantity == "pressure" { "one tactel" } else { "the whole pad" };
-            (
-                format!(
-                    "the setpoint of `{name}` is {setpoint}, but the limit `{key}` of {why} is {most}: it is never reached"
-                ),
-                format!("write a setpoint well below {most}, or raise `{key}` in [limits]"),
-            )
-        }
-        (_, Some((threshold, node)))
-            if quantity == "pressure" && setpoint <= threshold && mode.releases().next().is_none() =>
-        {
-            (
-                format!(
-                    "the setpoint of `{name}` is {setpoint}, but `{node}` drops tactels below {threshold}: the contact is lost \
-                 before it is reached"
-                ),
-                format!("write a setpoint well above {threshold}, for example {}", (3e6 * threshold).round() / 1e6),
-            )
-        }
-        _ => return None,
-    };
-    let node = feature.compared.as_deref()?;
-    Some(Diagnostic::new(Code::UnreachableSetpoint, mode.place(node, &format!("setpoint.{name}")), message).help(help))
-}
-
-/// Returns the smallest value of a tactel that a feature counts, and the node that drops smaller ones.
-fn least_felt<'a>(mode: &ModeLaw<'a>, feature: &Feature) -> Option<(f64, &'a str)> {
-    let nodes = upstream(mode, feature.measured.as_deref()?);
-    let node = nodes.into_iter().find(|node| node.kind.text == "binarize")?;
-    let value = |key: &str| mode.nodes.number(node, key);
-    Some((value("release").or_else(|| value("threshold"))?, &node.name))
 }

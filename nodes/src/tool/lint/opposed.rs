@@ -11,7 +11,8 @@ use crate::tool::control::settings::source;
 
 pub(super) fn check(arm: &Controlled<'_>, found: &mut Diagnostics) {
     for mode in &arm.modes {
-        found.extend(retreat(mode).or_else(|| held(mode)).or_else(|| push(arm, mode)));
+        let contradiction = retreat(mode).or_else(|| held(mode)).or_else(|| push(arm, mode));
+        found.extend(contradiction.or_else(|| pressed(mode)).or_else(|| contended(mode)));
     }
 }
 
@@ -73,11 +74,14 @@ fn holds(mode: &ModeLaw<'_>, guide: &Guidance) -> Option<[bool; 6]> {
     let moves = |key: &str| mode.nodes.number(node, key).is_some_and(|speed| speed > 0.0);
     let (linear, angular) = (moves("speed_m_per_s"), moves("speed_rad_per_s"));
     match guide.kind.as_str() {
-        "hold_pose" if source(node, "gate").is_none() => {
+        "hold_pose" if source(node, "gate").is_none_or(|gate| gate.ends_with(".present")) => {
             Some(std::array::from_fn(|i| if i < 3 { linear } else { angular }))
         }
-        // The force holds the distance to the surface on which a path lies.
-        "follow_path" => Some([linear, linear, false, false, false, false]),
+        "follow_path" => {
+            // Otherwise the force holds the distance to the surface on which the path lies.
+            let is_in_plane = mode.nodes.value(node, "in_plane").and_then(|value| value.value.read()).unwrap_or(false);
+            Some([linear, linear, linear && !is_in_plane, false, false, false])
+        }
         _ => None,
     }
 }
@@ -105,6 +109,65 @@ fn push(arm: &Controlled<'_>, mode: &ModeLaw<'_>) -> Option<Diagnostic> {
     );
     let help = "move along -z to leave the object, or let an exit wait for a force or for `touch.present`";
     Some(Diagnostic::new(Code::OpposedMotion, mode.place(&constant.node, "twist"), message).help(help))
+}
+
+/// Share of its setpoint by which a constant motion may shift a force [1].
+const SHIFTED: f64 = 0.2;
+
+/// Returns the warning about a constant motion into the object beside the control of a force: without an integral, the
+/// force rests above its setpoint, where the controller moves back as fast.
+fn pressed(mode: &ModeLaw<'_>) -> Option<Diagnostic> {
+    // An approach ends with the contact by which the force is measured.
+    if mode.waits_for_contact() {
+        return None;
+    }
+    let speed: f64 = mode.law.constants.iter().map(|constant| constant.twist[2]).sum();
+    let constant = mode.law.constants.iter().find(|constant| constant.is_free && constant.twist[2] > 0.0)?;
+    let shift = |feature: &Feature| speed / (feature.kp * feature.column[2]);
+    let is_shifted = |feature: &&Feature| {
+        let is_force = matches!(mode.quantity(feature), Some("pressure" | "force"));
+        let within = mode.within(feature).filter(|_| feature.ki > 0.0);
+        let is_left = feature.ki == 0.0 || within.is_some_and(|within| within < shift(feature));
+        is_force
+            && is_left
+            && feature.is_free(&mode.nodes)
+            && feature.schedules.is_empty()
+            && feature.column[2] > 0.0
+            && feature.setpoint.is_some_and(|setpoint| setpoint > 0.0 && shift(feature) > SHIFTED * setpoint)
+    };
+    let feature = mode.moving().find(is_shifted)?;
+    let message = format!(
+        "{}`{}` moves the sensor into the object with {speed} m/s beside the control of `{}`, which then rests {:.3} above its \
+         setpoint",
+        mode.named(),
+        constant.node,
+        feature.name,
+        shift(feature)
+    );
+    let help = format!("set 0 for `vz` of `{}` in this mode: the control of the force presses", constant.node);
+    Some(Diagnostic::new(Code::OpposedMotion, mode.place(&constant.node, "twist"), message).help(&*help))
+}
+
+/// Returns the warning about two forces whose integrals move the same component alone: each moves until its own setpoint
+/// is reached, and both are not reached together.
+fn contended(mode: &ModeLaw<'_>) -> Option<Diagnostic> {
+    let is_free = |feature: &&Feature| {
+        feature.ki > 0.0
+            && feature.is_free(&mode.nodes)
+            && feature.presses_alone()
+            && matches!(mode.quantity(feature), Some("pressure" | "force"))
+    };
+    let all: Vec<&Feature> = mode.moving().filter(is_free).collect();
+    let [one, other] = all[..] else { return None };
+    let differs = one.measured != other.measured || one.setpoint != other.setpoint;
+    let message = format!(
+        "{}the integrals of `{}` and `{}` both move `vz`, each until its own setpoint is reached: they never rest",
+        mode.named(),
+        one.name,
+        other.name
+    );
+    let help = "leave `ki` to one of them";
+    differs.then(|| Diagnostic::new(Code::OpposedMotion, mode.place_of_gain(other, "ki"), message).help(help))
 }
 
 fn deselect(i: usize) -> String {

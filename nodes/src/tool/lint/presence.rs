@@ -1,14 +1,16 @@
 //! Features that are never present where they are controlled: a gate keeps them away.
 
+use tactflow_runtime::graph::OutlinedBlock;
 use tactflow_runtime::source::{Code, Diagnostic, Diagnostics};
 
-use super::modes::force_limit;
+use super::reach::force_limit;
 use super::{Controlled, ModeLaw};
 use crate::tool::control::filters::way;
 use crate::tool::control::law::Feature;
 use crate::tool::control::settings::source;
 
 pub(super) fn check(arm: &Controlled<'_>, found: &mut Diagnostics) {
+    found.extend(arm.outline.nodes.iter().filter_map(|node| rate(arm, node)));
     // A feature that another mode lets pass is meant for that mode.
     let passes = |wanted: &Feature| {
         let each = arm.modes.iter().flat_map(|mode| mode.moving().map(move |feature| (mode, feature)));
@@ -26,6 +28,20 @@ pub(super) fn check(arm: &Controlled<'_>, found: &mut Diagnostics) {
     }
 }
 
+/// Returns the warning about a turning rate that something reads, where nothing says how the sensor moves along the line.
+fn rate(arm: &Controlled<'_>, node: &OutlinedBlock) -> Option<Diagnostic> {
+    if node.kind.text != "curvature" || source(node, "twist").is_some() {
+        return None;
+    }
+    let port = format!("{}.rate", node.name);
+    let reads = |reader: &&OutlinedBlock| reader.wires.iter().any(|wire| wire.source == port);
+    let reader = arm.outline.nodes.iter().find(reads)?;
+    let message =
+        format!("`{}` reads `{port}`, which is never present: `{}` has no `in.twist`", reader.name, node.name);
+    let help = format!("wire the twist that moves the sensor along the line to `in.twist` of `{}`", node.name);
+    Some(Diagnostic::new(Code::UnusedColumn, node.span.clone(), message).help(help))
+}
+
 /// Returns the flag that keeps a feature from moving the sensor in a mode, and why.
 fn barred<'f>(arm: &Controlled<'_>, mode: &ModeLaw<'_>, feature: &'f Feature) -> Option<(&'f str, String)> {
     feature.gates.iter().find_map(|gate| match mode.nodes.is_set(gate) {
@@ -36,14 +52,18 @@ fn barred<'f>(arm: &Controlled<'_>, mode: &ModeLaw<'_>, feature: &'f Feature) ->
     })
 }
 
-/// Returns why a comparison never sets its flag: it needs a larger force than a limit allows.
+/// Returns why a comparison never sets its flag: it needs a larger force than a limit allows, or than the mode asks for.
 fn out_of_reach(arm: &Controlled<'_>, mode: &ModeLaw<'_>, flag: &str) -> Option<String> {
     let node = mode.nodes.writer(flag).filter(|node| node.kind.text == "compare")?;
     let above = mode.nodes.number(node, "above")?;
     let port = way(&mode.nodes, source(node, "value")?).measured;
     let quantity = mode.quantity_of(&port)?;
-    let (limit, key) = force_limit(arm, mode, quantity)?;
-    (above >= limit).then(|| format!("which is set above {above}, where the limit `{key}` is {limit}"))
+    if let Some((limit, key)) = force_limit(arm, mode, quantity).filter(|(limit, _)| above >= *limit) {
+        return Some(format!("which is set above {above}, where the limit `{key}` is {limit}"));
+    }
+    let held = mode.moving().filter(|feature| mode.quantity(feature) == Some(quantity));
+    let (name, setpoint) = held.filter_map(|feature| Some((&feature.name, feature.setpoint?))).next()?;
+    (above > setpoint).then(|| format!("which is set above {above}, where the setpoint of `{name}` is {setpoint}"))
 }
 
 /// Returns whether a flag is the opposite of a contact.

@@ -22,6 +22,8 @@ pub(super) struct Answer {
 pub(super) struct Row {
     /// Those with a known sign. A tilt changes a force too, in either direction.
     pub(super) known: &'static [Answer],
+    /// Whether a column without any of them is a mistake.
+    pub(super) is_needed: bool,
 }
 
 const fn answer(component: usize, sign: f64, reason: &'static str) -> Answer {
@@ -37,18 +39,27 @@ const Y: &[Answer] = &[
     answer(3, 1.0, "a contact rolls along +y when the sensor turns about +x"),
 ];
 const FORCE: &[Answer] = &[answer(2, 1.0, "the force grows when the sensor moves along +z, toward the object")];
+const AREA: &[Answer] = &[answer(2, 1.0, "the area grows when the sensor moves along +z, toward the object")];
+const DRAG_X: &[Answer] = &[answer(0, -1.0, "an object drags the pad along -x when the sensor moves along +x")];
+const DRAG_Y: &[Answer] = &[answer(1, -1.0, "an object drags the pad along -y when the sensor moves along +y")];
+const TORQUE: &[Answer] = &[answer(5, -1.0, "an object turns the pad back when the sensor turns about +z")];
 const ANGLE: &[Answer] = &[answer(5, -1.0, "a line turns by a negative angle when the sensor turns about +z")];
 
 impl Row {
     /// Returns the components that change a quantity; `None` if geometry does not say.
     pub(super) fn of(quantity: &str) -> Option<Self> {
-        match quantity {
-            "x" => Some(Self { known: X }),
-            "y" => Some(Self { known: Y }),
-            "pressure" | "force" => Some(Self { known: FORCE }),
-            "orientation" => Some(Self { known: ANGLE }),
-            _ => None,
-        }
+        let (known, is_needed) = match quantity {
+            "x" => (X, true),
+            "y" => (Y, true),
+            "pressure" | "force" => (FORCE, true),
+            "orientation" => (ANGLE, true),
+            "area" => (AREA, false),
+            "fx" => (DRAG_X, false),
+            "fy" => (DRAG_Y, false),
+            "torque" => (TORQUE, false),
+            _ => return None,
+        };
+        Some(Self { known, is_needed })
     }
 
     /// Returns the components that change it, for a message.
@@ -56,6 +67,14 @@ impl Row {
         let names: Vec<String> =
             self.known.iter().map(|answer| format!("`{}`", COMPONENTS[answer.component])).collect();
         names.join(or)
+    }
+
+    /// Returns a column with the signs that reduce the error.
+    pub(super) fn signed(self, mut column: [f64; 6]) -> [f64; 6] {
+        for answer in self.known {
+            column[answer.component] = answer.sign * column[answer.component].abs();
+        }
+        column
     }
 
     /// Returns whether a motion changes the quantity.

@@ -2,6 +2,7 @@
 
 use std::cmp::Ordering;
 use std::collections::{BTreeMap, BTreeSet};
+use std::ops::Range;
 
 use tactflow_runtime::source::{Code, Diagnostic, Diagnostics, Edit};
 
@@ -151,10 +152,16 @@ fn low_margin(mode: &ModeLaw<'_>, feature: &Feature, loops: &[(&Contact, Loop)],
         None => diagnostic,
     };
     let diagnostic = feature.beside.iter().fold(diagnostic, |diagnostic, other| {
-        let note = format!("the loop of `{}` adds to it: both answer the same measurement", other.name);
+        let why = if other.measured == feature.measured { "answer the same measurement" } else { "move `vz`" };
+        let note = format!("the loop of `{}` adds to it: both {why}", other.name);
         diagnostic.note(mode.place_of_gain(other, "kp"), note)
     });
     let loops: Vec<Loop> = loops.iter().map(|(_, around)| around.clone()).collect();
+    if let Some((kd, without)) = undamped(mode, feature, &loops) {
+        return diagnostic
+            .help(format!("remove `kd` of `{name}`: without it, the margins hold"))
+            .edit(Edit::Replace(kd, without));
+    }
     let Some(factor) =
         factor(&loops, KEPT).filter(|factor| *factor < 1.0).and_then(|factor| quick(mode, feature, &loops, factor))
     else {
@@ -170,6 +177,12 @@ fn low_margin(mode: &ModeLaw<'_>, feature: &Feature, loops: &[(&Contact, Loop)],
     places.into_iter().fold(diagnostic.help(help), |diagnostic, (place, gain)| {
         diagnostic.edit(Edit::Replace(place, format!("{gain:?}")))
     })
+}
+
+/// Returns the place of a derivative gain that alone takes the margins of all loops, and what stands there without it.
+fn undamped(mode: &ModeLaw<'_>, feature: &Feature, loops: &[Loop]) -> Option<(Range<usize>, String)> {
+    let is_good = feature.kd > 0.0 && loops.iter().all(|around| KEPT.holds(&margins(&around.without_derivative())));
+    is_good.then(|| (mode.place_of_gain(feature, "kd"), "0.0".to_owned()))
 }
 
 /// Returns the largest factor on the gains, up to a first one, with which the filters are quick enough for each loop.

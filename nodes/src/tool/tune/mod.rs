@@ -14,6 +14,7 @@ mod trial;
 mod ways;
 
 use std::collections::BTreeMap;
+use std::ops::RangeInclusive;
 use std::path::{Path, PathBuf};
 
 use serde::Serialize;
@@ -144,7 +145,7 @@ struct Found {
     /// What was measured, for each component.
     #[serde(skip)]
     lines: Vec<Vec<Line>>,
-    /// How much larger the answer to the largest motion is than to the one before, if no two motions agree [1].
+    /// The answer to the largest motion as a multiple of that to the one before, if no two motions agree [1].
     #[serde(skip_serializing_if = "Option::is_none")]
     growth: Option<f64>,
     /// Why there is no fit.
@@ -229,8 +230,9 @@ fn tune(args: &TuneArgs, shell: &Shell, request: &Request, outline: &Outline) ->
             Ok(propose(feature.clone(), found, &contacts, wanted, outline.period_s))
         };
         let first = measure(HALF)?;
-        // A stiff loop holds the contact against the test signal, and friction then hides more of the motion.
-        features.push(match first.factor().filter(|factor| *factor < HIGH) {
+        // A stiff loop holds the contact against the test signal, and friction then hides more of the motion. A soft one
+        // has not settled when the signal begins.
+        features.push(match first.factor().filter(|factor| !NEAR.contains(factor)) {
             Some(factor) => {
                 let name = &feature.name;
                 shell.say_beside(&format!("`{name}`: again, with a quarter of the gains that were found"));
@@ -301,8 +303,8 @@ fn quantity(feature: &Feature) -> String {
     feature.quantity().unwrap_or(&feature.name).to_owned()
 }
 
-/// Proposed gains, as a multiple of those of the graph, below which a loop is measured again [1].
-const HIGH: f64 = 0.83;
+/// Proposed gains, as a multiple of those of the graph, with which a loop is not measured again [1].
+const NEAR: RangeInclusive<f64> = 0.83..=3.0;
 /// Share of the proposed gains with which it is measured again [1].
 const QUARTER: f64 = 0.25;
 

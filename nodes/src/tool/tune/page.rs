@@ -44,9 +44,12 @@ fn answers(found: &[Found]) -> String {
     let rows: Vec<[String; 7]> = [ANSWERS.map(str::to_owned)].into_iter().chain(rows).collect();
     let mut text = if rows.len() > 1 { table(&rows, 2, 7) } else { String::new() };
     for (object, growth) in found.iter().filter_map(|one| Some((&one.object, one.growth?))) {
-        let more = 100.0 * (growth - 1.0);
-        let _ =
-            writeln!(text, "Over `{object}`, the largest motion has an answer that is {more:.0} % larger: it counts.");
+        let change = 100.0 * (growth - 1.0).abs();
+        let (how, which) = if growth > 1.0 { ("larger", "it") } else { ("smaller", "the one before") };
+        let _ = writeln!(
+            text,
+            "Over `{object}`, the largest motion has an answer that is {change:.0} % {how}: {which} counts."
+        );
     }
     for (object, why) in found.iter().filter_map(|one| Some((&one.object, one.refused.as_ref()?))) {
         let _ = writeln!(text, "Not measured over `{object}`: {why}.");

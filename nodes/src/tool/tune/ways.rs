@@ -12,19 +12,20 @@ const WAYS: [[f64; 4]; 2] = [[0.3e-3, 1.2e-3, 2.4e-3, 4.8e-3], [0.01, 0.02, 0.04
 const AGREES: f64 = 0.2;
 /// A motion that is so many times as large as another one is larger [1].
 const FURTHER: f64 = 1.3;
-/// Growth of the response from one way to the next with which the larger one counts [1].
-const MAX_GROWTH: f64 = 0.5;
+/// Change of the response from one way to the next with which the larger one counts [1].
+const MAX_CHANGE: f64 = 0.5;
 
 /// What the motions of all ways say.
 pub(super) struct Response {
     pub(super) lines: Vec<Line>,
-    /// How much larger the last response is than the one before, if no two of them agree [1].
+    /// The last response as a multiple of the one before, if no two of them agree [1].
     pub(super) growth: Option<f64>,
 }
 
 /// Moves further and further, as far as the task stays in its mode, and returns the response to the largest motions
 /// that agree. Friction hides a small motion, and gives two of them the same wrong response: no larger motion may have
-/// a larger one. If the response only grows a little to the end, the last one counts, which has the smallest margins.
+/// a larger one. If the last two only differ a little, the larger response counts, which has the smaller margins: a
+/// contact may stiffen when it is pressed further, and press less when it is nearly left.
 pub(super) fn agreed(experiment: &Experiment<'_>, shell: &Shell) -> Result<Result<Response, String>, Stop> {
     let mut runs: Vec<Vec<Line>> = Vec::new();
     let mut stopped = None;
@@ -47,8 +48,13 @@ pub(super) fn agreed(experiment: &Experiment<'_>, shell: &Shell) -> Result<Resul
     }
     if let [.., before, last] = &runs[..] {
         let growth = loudness(before, last);
-        if growth > 1.0 && growth <= 1.0 + MAX_GROWTH && shared(before, last) >= ENOUGH {
-            return Ok(Ok(Response { lines: last.clone(), growth: Some(growth) }));
+        let is_close = match growth > 1.0 {
+            true => growth <= 1.0 + MAX_CHANGE && shared(before, last) >= ENOUGH,
+            false => difference(before, last) <= MAX_CHANGE,
+        };
+        if is_close {
+            let lines = if growth > 1.0 { last } else { before }.clone();
+            return Ok(Ok(Response { lines, growth: Some(growth) }));
         }
     }
     Ok(Err(match agree {

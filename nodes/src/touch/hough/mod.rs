@@ -63,7 +63,7 @@ pub struct Params {
     #[param(unit = "m", above = 0.0)]
     offset_step: Option<f64>,
     /// Smallest strength of a line.
-    #[param(unit = "1", range = 0.0..=1.0, default = 0.3)]
+    #[param(unit = "1", range = 0.0..=1.0, usual = ..=0.95, default = 0.3)]
     min_strength: f64,
     /// Weight of each tactel: its value, its excess over `threshold`, or 1.
     #[param(default = Weight::Force)]

@@ -34,9 +34,9 @@ pub(crate) fn check(
         // A task may wait at rest until it is touched, and move in other modes.
         let is_meant_to_move = is_bounded || is_always_still || is_set();
         if moving.is_empty() && is_meant_to_move && !all.is_empty() && !motions.wakes(i) {
-            diagnostics.push(report(net, i, &all, true));
+            diagnostics.push(report(net, i, &all, Some(is_always_still)));
         } else if !moving.is_empty() && moving.iter().all(|node| motions.of(i, *node) == Motion::Retreat) {
-            diagnostics.push(report(net, i, moving, false));
+            diagnostics.push(report(net, i, moving, None));
         }
     }
 }
@@ -79,17 +79,23 @@ fn waits(net: &Net<'_>, contact: &ContactPorts, exit: &PlannedExit) -> bool {
     is_met_by_contact && contact.need(net, watched.source)
 }
 
-fn report(net: &Net<'_>, mode: usize, generators: &[usize], is_still: bool) -> Diagnostic {
+/// `still` is whether the nodes rest in all modes, if they rest in this one.
+fn report(net: &Net<'_>, mode: usize, generators: &[usize], still: Option<bool>) -> Diagnostic {
     let block = &net.flat.modes[mode];
     let (name, names) = (net.flat.mode_name(mode), quoted(generators.iter().map(|node| &net.flat.nodes[*node].name)));
-    let message = match is_still {
-        true => format!("mode `{name}` waits for a contact, but {names} does not move the sensor"),
-        false => {
+    let message = match still {
+        Some(_) => format!("mode `{name}` waits for a contact, but {names} does not move the sensor"),
+        None => {
             format!("mode `{name}` waits for a contact, but {names} moves the sensor away from the object, along -z")
         }
     };
     let place = generators.iter().find_map(|node| net.setting(mode, *node)).and_then(first_place);
-    let help = format!("let {names} move along +z of the sensor in this mode, which points toward the object");
+    let useless = if still == Some(true) {
+        format!("; or remove {names}, if the object comes to the sensor")
+    } else {
+        String::new()
+    };
+    let help = format!("let {names} move along +z of the sensor in this mode, which points toward the object{useless}");
     Diagnostic::new(Code::NoApproach, place.unwrap_or_else(|| block.key.span.clone()), message).help(help)
 }
 

@@ -1,0 +1,137 @@
+//! Lines: the angle at which a mode holds one, and positions that are controlled along it.
+
+use std::f64::consts::{FRAC_PI_2, PI};
+use std::fmt;
+
+use tactflow_runtime::source::{Code, Diagnostic, Diagnostics, Item, Table};
+
+use super::{Controlled, ModeLaw};
+use crate::tool::control::law::{Feature, Guidance};
+
+/// Nodes that guide the sensor along a line.
+const LINE_GUIDES: [&str; 2] = ["ridge_guide", "follow_path"];
+/// Largest angle between a line and an axis of the sensor along which the line lies [rad].
+const ALONG: f64 = 0.35;
+
+pub(super) fn check(arm: &Controlled<'_>, found: &mut Diagnostics) {
+    found.extend(arm.modes.iter().filter_map(|mode| along_line(arm, mode)));
+}
+
+/// Returns the warning about a position that a mode controls along a line, while it moves the sensor along this line, or
+/// while the bench states that the line is longer than the pad.
+///
+/// A task that follows a line moves along it. Where the line is longer than the pad, the middle of its print is that of
+/// the pad, and where it ends, the control of the position works against the motion.
+fn along_line(arm: &Controlled<'_>, mode: &ModeLaw<'_>) -> Option<Diagnostic> {
+    let positions = line_positions(mode);
+    let along = |moves: &dyn Fn(usize) -> bool| {
+        let mut axes = positions.iter().map(|axis| usize::from(*axis == "y"));
+        !positions.is_empty() && axes.all(moves)
+    };
+    let mut constants = mode.law.constants.iter().filter(|constant| along(&|i| constant.twist[i] != 0.0));
+    let is_guide =
+        |guide: &&Guidance| LINE_GUIDES.contains(&&*guide.kind) && !mode.rests(guide) && along(&|i| guide.passes[i]);
+    let guide = || mode.law.guidance.iter().find(is_guide).map(Guidance::node);
+    let held = |i: usize| {
+        let axis = ["x", "y"][i];
+        mode.moving().find(|feature| mode.quantity(feature) == Some(axis) && feature.column[i] != 0.0)
+    };
+    let feature = held(usize::from(*positions.first()? == "y")).filter(|_| along(&|i| held(i).is_some()))?;
+    let stated = stated(arm, mode, feature);
+    let why = match constants.next().map(|constant| &*constant.node).or_else(guide) {
+        Some(follower) if stated.as_ref().is_none_or(Line::is_longer) => format!("the line that `{follower}` follows"),
+        // It crawls along the line, which matters where nothing but the end of the contact ends it.
+        _ if mode.tables("done").next().is_some() || mode.exits("go").any(|exit| !exit.is_lost()) => return None,
+        _ => stated.filter(Line::is_longer)?.to_string(),
+    };
+    let message = format!(
+        "{}`{}` is controlled along {why}: the middle of a long print says nothing about a position along it",
+        mode.named(),
+        feature.name
+    );
+    let help = match positions[..] {
+        ["x", "y"] => {
+            "let the setpoint of the angle turn the line along `x` or `y`, and control the position across it only"
+                .to_owned()
+        }
+        [axis, ..] => format!("select 0 for `v{axis}` in the projector behind the column of `{}`", feature.name),
+        [] => return None,
+    };
+    Some(Diagnostic::new(Code::LinePosition, mode.place_of_column(feature), message).help(help))
+}
+
+/// Returns the position along the line that a mode holds at an angle, `x` or `y`; `None` without a line, or if it lies
+/// along neither axis.
+pub(super) fn line_axis(mode: &ModeLaw<'_>) -> Option<&'static str> {
+    match line_positions(mode)[..] {
+        [axis] => Some(axis),
+        _ => None,
+    }
+}
+
+/// Returns the positions that change along the line that a mode holds at an angle: both, if it lies along neither axis,
+/// and none without a line.
+fn line_positions(mode: &ModeLaw<'_>) -> Vec<&'static str> {
+    let Some(angle) = line_angle(mode) else { return Vec::new() };
+    match angle.rem_euclid(PI) {
+        angle if (angle - FRAC_PI_2).abs() < ALONG => vec!["y"],
+        angle if !(ALONG..=PI - ALONG).contains(&angle) => vec!["x"],
+        _ => vec!["x", "y"],
+    }
+}
+
+/// Returns the angle at which a mode holds a line [rad].
+pub(super) fn line_angle(mode: &ModeLaw<'_>) -> Option<f64> {
+    let mut lines = mode.moving().filter(|feature| mode.quantity(feature) == Some("orientation"));
+    lines.find_map(|feature| feature.setpoint)
+}
+
+/// The longest line among the objects of a simulated bench.
+struct Line<'a> {
+    shape: &'a str,
+    /// Its length and that of the pad [m].
+    length: f64,
+    pad: f64,
+}
+
+impl Line<'_> {
+    fn is_longer(&self) -> bool {
+        self.length > self.pad
+    }
+}
+
+impl fmt::Display for Line<'_> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let [length, pad] = [self.length, self.pad].map(|length| (length * 1e3).round());
+        write!(f, "the {} of {length} mm, on a pad of {pad} mm", self.shape)
+    }
+}
+
+/// Returns the longest line that a simulated bench states, on a pad that measures a place.
+fn stated<'a>(arm: &Controlled<'a>, mode: &ModeLaw<'_>, feature: &Feature) -> Option<Line<'a>> {
+    let [from, to] = mode.range(feature)?;
+    let objects = arm.outline.devices.iter().flat_map(|device| &device.settings);
+    let objects = objects.filter(|setting| setting.path == "objects").filter_map(|setting| match &setting.value.item {
+        Item::Array(objects) => Some(objects),
+        _ => None,
+    });
+    let lines = objects.flatten().filter_map(|object| line(object.as_table()?));
+    let (shape, length) = lines.max_by(|(_, one), (_, other)| one.total_cmp(other))?;
+    Some(Line { shape, length, pad: to - from })
+}
+
+/// Returns the shape and the length [m] of an object whose print is a line or the face of a box.
+fn line(object: &Table) -> Option<(&str, f64)> {
+    let shape = object.get("shape")?.as_str()?;
+    let length = match shape {
+        "pen" => object.get("length")?.read()?,
+        "box" => object.get("size")?.read::<[f64; 3]>()?.into_iter().fold(0.0, f64::max),
+        "cable" => {
+            let points: Vec<[f64; 3]> = object.get("points")?.read()?;
+            let steps = points.windows(2).map(|pair| (0..3).map(|i| (pair[1][i] - pair[0][i]).powi(2)).sum::<f64>());
+            steps.map(f64::sqrt).sum()
+        }
+        _ => return None,
+    };
+    Some((shape, length))
+}

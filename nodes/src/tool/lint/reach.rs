@@ -1,0 +1,176 @@
+//! What a mode asks for or waits for and never gets: it lies beyond a limit, below a threshold, beside a window, or within a
+//! deadband.
+
+use tactflow_runtime::graph::OutlinedBlock;
+use tactflow_runtime::source::{Code, Diagnostic, Diagnostics};
+
+use super::modes::upstream;
+use super::{Controlled, ModeLaw};
+use crate::tool::control::filters::way;
+use crate::tool::control::law::Feature;
+use crate::tool::control::settings::source;
+
+pub(super) fn check(arm: &Controlled<'_>, found: &mut Diagnostics) {
+    for mode in &arm.modes {
+        found.extend(mode.moving().filter_map(|feature| setpoint(arm, mode, feature)));
+        found.extend(mode.moving().filter_map(|feature| asleep(mode, feature)));
+        found.extend(mode.moving().filter_map(|feature| beside_window(mode, feature)));
+        found.extend(bounds(arm, mode));
+    }
+    found.extend(arm.modes.first().into_iter().flat_map(|mode| thresholds(arm, mode)));
+}
+
+/// Returns the warnings about exits that wait for a larger force than a limit allows.
+fn bounds(arm: &Controlled<'_>, mode: &ModeLaw<'_>) -> Diagnostics {
+    let exits = ["go", "done"].into_iter().flat_map(|kind| mode.tables(kind));
+    let never = exits.filter_map(|exit| {
+        let table = exit.as_table()?;
+        let (when, above) = (table.get("when")?.as_str()?, table.get("above")?);
+        let quantity = watched(arm, mode, when)?;
+        let (limit, key) = force_limit(arm, mode, &quantity)?;
+        let bound = above.read::<f64>().filter(|bound| *bound >= limit)?;
+        let message = format!("an exit of mode `{}` waits for `{when}` above {bound}, but the limit `{key}` is {limit}: it is never taken", mode.own_name());
+        let help = format!("write a bound well below {limit}, or raise `{key}` in [limits]");
+        Some(Diagnostic::new(Code::UnreachableSetpoint, above.span.clone(), message).help(help))
+    });
+    never.collect()
+}
+
+/// Returns what an exit watches, through filters, or by the name that a part gives it.
+fn watched(arm: &Controlled<'_>, mode: &ModeLaw<'_>, when: &str) -> Option<String> {
+    let measured = way(&mode.nodes, when).measured;
+    if let Some(quantity) = mode.quantity_of(&measured) {
+        return Some(quantity.to_owned());
+    }
+    let (part, name) = when.rsplit_once('.')?;
+    let ports = arm.outline.nodes.iter().flat_map(|node| &node.outputs);
+    let mut inside = ports.filter(|port| port.name.strip_prefix(part).is_some_and(|rest| rest.starts_with('.')));
+    inside.any(|port| mode.quantity_of(&port.name) == Some(name)).then(|| name.to_owned())
+}
+
+/// Parameters of nodes that need a force, by their type.
+const LEAST_FORCES: [(&str, &str); 2] = [("label", "min_force"), ("friction_margin", "least_force")];
+
+/// Returns the warnings about nodes that need a larger force than a limit allows.
+fn thresholds(arm: &Controlled<'_>, mode: &ModeLaw<'_>) -> Diagnostics {
+    let nodes = upstream(mode, &arm.twist);
+    let never = nodes.into_iter().filter_map(|node| {
+        let (_, key) = LEAST_FORCES.into_iter().find(|(kind, _)| node.kind.text == *kind)?;
+        let (limit, limit_key) = force_limit(arm, mode, "force").filter(|(_, key)| key.ends_with("_n"))?;
+        let least = mode.nodes.number(node, key).filter(|least| *least >= limit)?;
+        let message = format!(
+            "`{}` needs {least} N, but the limit `{limit_key}` is {limit}: the pad never feels that much",
+            node.name
+        );
+        let help = format!("write `{key}` well below {limit}, or raise `{limit_key}` in [limits]");
+        Some(Diagnostic::new(Code::UnreachableSetpoint, mode.place(&node.name, key), message).help(help))
+    });
+    never.collect()
+}
+
+/// Returns the smallest limit of a force, and its key.
+pub(super) fn force_limit(arm: &Controlled<'_>, mode: &ModeLaw<'_>, quantity: &str) -> Option<(f64, String)> {
+    let limit = match quantity {
+        "pressure" => "peak",
+        "force" => "force",
+        _ => return None,
+    };
+    let limiters = arm.limits.iter().filter(|limiter| limiter.kind.ends_with("contact_limit"));
+    let limits = limiters.filter_map(|limiter| {
+        let node = mode.nodes.node(&limiter.node)?;
+        let keys = [format!("{limit}_n"), format!("{limit}_raw")];
+        keys.into_iter().find_map(|key| Some((mode.nodes.number(node, &key)?, key)))
+    });
+    limits.min_by(|(one, _), (other, _)| one.total_cmp(other))
+}
+
+/// Returns the warning about a setpoint of a force that the task never reaches: above a limit, or below what the pad
+/// feels.
+pub(super) fn setpoint(arm: &Controlled<'_>, mode: &ModeLaw<'_>, feature: &Feature) -> Option<Diagnostic> {
+    let (quantity, setpoint) = (mode.quantity(feature)?, feature.setpoint?);
+    let name = &feature.name;
+    let (message, help) = match (force_limit(arm, mode, quantity)?, least_felt(mode, feature)) {
+        ((most, key), _) if setpoint >= most => {
+            let why = if quantity == "pressure" { "one tactel" } else { "the whole pad" };
+            (
+                format!(
+                    "the setpoint of `{name}` is {setpoint}, but the limit `{key}` of {why} is {most}: it is never reached"
+                ),
+                format!("write a setpoint well below {most}, or raise `{key}` in [limits]"),
+            )
+        }
+        (_, Some((threshold, node))) if quantity == "pressure" && setpoint <= threshold && !lets_go(arm, mode) => (
+            format!(
+                "the setpoint of `{name}` is {setpoint}, but `{node}` drops tactels below {threshold}: the contact is lost \
+                 before it is reached"
+            ),
+            format!("write a setpoint well above {threshold}, for example {}", (3e6 * threshold).round() / 1e6),
+        ),
+        _ => return None,
+    };
+    let node = feature.compared.as_deref()?;
+    Some(Diagnostic::new(Code::UnreachableSetpoint, mode.place(node, &format!("setpoint.{name}")), message).help(help))
+}
+
+/// Returns the warning about a deadband in which a feature rests whatever it measures.
+fn asleep(mode: &ModeLaw<'_>, feature: &Feature) -> Option<Diagnostic> {
+    let band = deadband(mode, feature)?;
+    let (name, path) = (&feature.name, format!("width.{}.outer", feature.name));
+    let (outer, setpoint) = (mode.nodes.number(band, &path)?, feature.setpoint?);
+    let (largest, why) = match mode.quantity(feature)? {
+        // The error of a contact that presses no more.
+        "pressure" | "force" if setpoint > 0.0 => {
+            (setpoint, "once it rests, it presses no more, whatever the object does")
+        }
+        "x" | "y" => (mode.farthest(feature)?, "it rests wherever the contact is"),
+        _ => return None,
+    };
+    if outer < largest {
+        return None;
+    }
+    let message = format!("`{name}` rests up to an error of {outer}, but none is larger than {largest}: {why}");
+    let help = format!("write an `outer` well below {largest}, for example {}", (1e5 * largest).round() / 1e6);
+    Some(Diagnostic::new(Code::UnreachableSetpoint, mode.place(&band.name, &path), message).help(help))
+}
+
+/// Returns the warning about a place outside of the window in which it is measured.
+fn beside_window(mode: &ModeLaw<'_>, feature: &Feature) -> Option<Diagnostic> {
+    let axis = ["x", "y"].iter().position(|axis| mode.quantity(feature) == Some(axis))?;
+    let windows = upstream(mode, feature.measured.as_deref()?);
+    let window = windows.into_iter().find(|node| node.kind.text == "image_window")?;
+    // A window that follows a point goes with the contact.
+    if source(window, "x").is_some() || source(window, "y").is_some() {
+        return None;
+    }
+    let pair = |key: &str| mode.nodes.value(window, key).and_then(|value| value.value.read::<[f64; 2]>());
+    let (size, centre) = (pair("size")?[axis], pair("centre").unwrap_or_default()[axis]);
+    let setpoint = feature.setpoint.filter(|setpoint| (setpoint - centre).abs() > size / 2.0)?;
+    let (name, [from, to]) = (&feature.name, [-0.5, 0.5].map(|side| ((centre + side * size) * 1e6).round() / 1e6));
+    let message = format!(
+        "the setpoint of `{name}` is {setpoint} m, but `{}` shows the pad from {from} to {to} m: it is never reached",
+        window.name
+    );
+    let help = format!("write a setpoint between {from} and {to}, or a larger `size` of `{}`", window.name);
+    let place = mode.place(feature.compared.as_deref()?, &format!("setpoint.{name}"));
+    Some(Diagnostic::new(Code::UnreachableSetpoint, place, message).help(help))
+}
+
+/// Returns the node that lets a feature rest while its error is small.
+pub(super) fn deadband<'a>(mode: &ModeLaw<'a>, feature: &Feature) -> Option<&'a OutlinedBlock> {
+    let pid = mode.nodes.node(feature.pid.as_deref()?)?;
+    mode.nodes.writer(source(pid, "error")?).filter(|node| node.kind.text == "deadband")
+}
+
+/// Returns whether a mode is meant to end without a contact: an exit waits for that, or the sensor moves away after it.
+fn lets_go(arm: &Controlled<'_>, mode: &ModeLaw<'_>) -> bool {
+    let leaves = |name: &str| arm.modes.iter().any(|other| other.own_name() == name && other.approach() < 0.0);
+    mode.releases().next().is_some() || mode.lost().any(|exit| leaves(exit.to))
+}
+
+/// Returns the smallest value of a tactel that a feature counts, and the node that drops smaller ones.
+fn least_felt<'a>(mode: &ModeLaw<'a>, feature: &Feature) -> Option<(f64, &'a str)> {
+    let nodes = upstream(mode, feature.measured.as_deref()?);
+    let node = nodes.into_iter().find(|node| node.kind.text == "binarize")?;
+    let value = |key: &str| mode.nodes.number(node, key);
+    Some((value("release").or_else(|| value("threshold"))?, &node.name))
+}
