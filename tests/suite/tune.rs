@@ -43,7 +43,7 @@ fn a_slow_edge_gets_the_gain_that_was_found_by_hand_and_the_files_keep_their_com
     let modes = explained["motions"][0]["modes"].as_array().unwrap();
     let loops = modes.iter().flat_map(|mode| mode["loops"].as_array().unwrap());
     let of_edge: Vec<&Value> = loops.filter(|one| one["feature"] == "orientation").collect();
-    assert!(of_edge.iter().all(|one| one["object"] == "edge_bench"), "{of_edge:?}");
+    assert!(of_edge.iter().all(|one| one["object"] == "edge"), "{of_edge:?}");
     let margins = &of_edge.first().unwrap()["margins"];
     assert!(margins["gain_db"].as_f64().unwrap() > 6.0, "{margins}");
 }
@@ -68,7 +68,12 @@ fn a_loop_is_measured_with_several_settings_and_the_worst_of_them_decides() {
     let worst = margins.iter().map(|margins| margins["peak_sensitivity"].as_f64().unwrap()).fold(0.0, f64::max);
     assert!(margins.len() == 2 && (1.2..=1.7).contains(&worst), "{margins:?}");
     let saved: toml::Table = toml::from_str(&fs::read_to_string(&bench).unwrap()).unwrap();
-    assert_eq!(saved["facts"]["arm"]["contacts"].as_array().unwrap().len(), 2, "each setting has its contact");
+    let saved = saved["facts"]["arm"]["contacts"].as_array().unwrap();
+    assert_eq!(saved.len(), 2, "each setting has its contact");
+    let stated: toml::Table = toml::from_str(&shipped("benches/pen.toml")).unwrap();
+    let stated = stated["facts"]["arm"]["contacts"][0].as_table().unwrap();
+    let kept = stated.iter().filter(|(key, _)| *key != "pressure");
+    assert!(kept.into_iter().all(|(key, value)| saved[0].get(key) == Some(value)), "{saved:?}");
     // The task has the new gains, and the shipped bench states the contact of another measurement.
     let explained = explained(&[&path, "--bench", "graphs/benches/pen.toml"]);
     let modes = explained["motions"][0]["modes"].as_array().unwrap();
@@ -112,6 +117,25 @@ fn a_picture_that_cannot_be_written_is_found_before_the_robot_moves() {
         assert_eq!(said.code, 2, "{}{}", said.out, said.err);
         assert!(said.err.contains(path) && !said.err.contains("test signal"), "{}", said.err);
     }
+}
+
+#[test]
+fn gains_beyond_their_live_range_are_tried_and_saved_with_a_wider_range() {
+    let (_folder, path) = in_new_folder("hybrid.toml");
+    let text = shipped("hybrid.toml").replace("gains.x = { kp = 3.5", "gains.x = { kp = 0.7");
+    let narrow = "\npid.gains.x.kp = { min = 0.5, max = 0.8, rate = 2.0 } # narrow\n";
+    fs::write(&path, text.replace("\n[live]", "\n[live]\n#") + narrow).unwrap();
+    let bench = Path::new(&path).with_file_name("ball.toml").display().to_string();
+    fs::write(&bench, shipped("benches/ball.toml")).unwrap();
+    let said = say(&["tune", &path, "--bench", &bench, "--feature", "x", "--save"]);
+    assert_eq!(said.code, 0, "{}{}", said.out, said.err);
+    let saved = fs::read_to_string(&path).unwrap();
+    let graph: toml::Table = toml::from_str(&saved).unwrap();
+    let kp = graph["nodes"]["pid"]["gains"]["x"]["kp"].as_float().unwrap();
+    assert!(kp > 2.0, "{kp}");
+    assert_eq!(graph["live"]["pid"]["gains"]["x"]["kp"]["max"].as_float(), Some(kp));
+    assert!(saved.contains("# narrow"), "{saved}");
+    assert_eq!(say(&["check", &path, "--bench", &bench]).code, 0);
 }
 
 #[test]

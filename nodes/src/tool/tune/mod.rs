@@ -1,11 +1,13 @@
 //! `tactflow tune`: measures how the features answer, and proposes gains with margins.
 
 mod bode;
+mod cases;
 mod course;
 mod experiment;
 mod fit;
 mod lift;
 mod page;
+mod ranges;
 mod save;
 mod stay;
 mod step;
@@ -13,13 +15,13 @@ mod target;
 mod trial;
 mod ways;
 
-use std::collections::BTreeMap;
 use std::ops::RangeInclusive;
 use std::path::{Path, PathBuf};
 
 use serde::Serialize;
 use tactflow_runtime::cli::clap::{self, ValueEnum};
 use tactflow_runtime::cli::{GraphArgs, Shell};
+use tactflow_runtime::engine::Engine;
 use tactflow_runtime::graph::{Outline, Request, compile};
 
 use super::arguments::{may_draw, write};
@@ -31,8 +33,10 @@ use super::control::margins::{Margins, margins};
 use super::control::response::Loop;
 use super::control::settings::{self, Index, Nodes};
 use crate::motion::COMPONENTS;
+use cases::{Case, Stated, arm_of, cases};
 use experiment::{Experiment, HALF, Line};
 use fit::{ENOUGH, Fit, fit};
+use ranges::Range;
 use target::{adder, controlled};
 use trial::{Settled, Trial};
 use ways::{Response, agreed};
@@ -109,10 +113,13 @@ struct Tuned {
     arm: String,
     wanted: Wanted,
     contacts: Vec<Contact>,
-    /// The bench of each contact.
+    /// The bench of each contact, and what it has stated before.
     #[serde(skip)]
-    files: Vec<Option<PathBuf>>,
+    benches: Vec<Stated>,
     features: Vec<TunedFeature>,
+    /// The ranges of `[live]` that do not hold the proposed gains, as wide as they must be.
+    #[serde(skip)]
+    ranges: Vec<Range>,
     /// How the task holds its features with the old and with the new gains, for each bench.
     settled: Vec<Settled>,
 }
@@ -152,6 +159,24 @@ struct Found {
     refused: Option<String>,
 }
 
+impl Tuned {
+    /// Returns what each bench states now: what was measured, and what it has stated of other features and objects.
+    fn stated(&self) -> Vec<Stated> {
+        let mut benches: Vec<Stated> = Vec::new();
+        for (bench, measured) in self.benches.iter().zip(&self.contacts).filter(|(_, it)| !it.features.is_empty()) {
+            if benches.last().is_none_or(|last| last.file != bench.file) {
+                benches.push(bench.clone());
+            }
+            let Some(Stated { contacts, .. }) = benches.last_mut() else { continue };
+            match contacts.iter_mut().find(|contact| contact.object == measured.object) {
+                Some(contact) => contact.features.extend(measured.features.clone()),
+                None => contacts.push(measured.clone()),
+            }
+        }
+        benches
+    }
+}
+
 /// Why nothing is tuned.
 enum Stop {
     Refused(String),
@@ -170,12 +195,16 @@ pub(super) fn run(args: TuneArgs, shell: &Shell) -> Result<u8, u8> {
     // Each run opens the devices by itself, and most devices can be open once.
     let compiled = compile(shell.catalogue(), &request).map_err(|report| shell.reject(&report))?;
     let outline = compiled.outline().clone();
-    drop(compiled);
+    let ranges = Range::all(&Engine::new(compiled));
+    let opened = ranges.iter().flat_map(Range::opened);
+    let request = Request { set: request.set.iter().cloned().chain(opened).collect(), ..request };
     let tuned = match tune(&args, shell, &request, &outline) {
         Ok(tuned) => tuned,
         Err(Stop::Interrupted) => return Ok(130),
         Err(Stop::Refused(message)) => return Err(shell.refuse(message)),
     };
+    let ranges = ranges.iter().filter_map(|range| range.beyond(&tuned.features)).collect();
+    let tuned = Tuned { ranges, ..tuned };
     match args.format {
         Format::Json => shell.say_json(&tuned),
         Format::Text => shell.say(page::text(&tuned).trim_end()),
@@ -203,7 +232,7 @@ fn writable(path: &Path) -> Result<(), String> {
 }
 
 fn tune(args: &TuneArgs, shell: &Shell, request: &Request, outline: &Outline) -> Result<Tuned, Stop> {
-    let (command, port) = settings::commands(outline).next().ok_or("no role is an arm, so nothing moves".to_owned())?;
+    let (_, port) = settings::commands(outline).next().ok_or("no role is an arm, so nothing moves".to_owned())?;
     let index = Index::new(outline);
     let (_, twist) = chain(&Nodes::new(&index, None), port)?;
     let (mode, controlled) = controlled(args, &index, &twist)?;
@@ -242,9 +271,10 @@ fn tune(args: &TuneArgs, shell: &Shell, request: &Request, outline: &Outline) ->
             None => first,
         });
     }
-    let arm = command.trim_end_matches(".velocity").to_owned();
-    let files = cases.iter().map(|case| case.file.clone()).collect();
-    let mut tuned = Tuned { mode: mode.name.clone(), arm, wanted, contacts, files, features, settled: Vec::new() };
+    let arm = arm_of(outline).unwrap_or_default().to_owned();
+    let benches = cases.iter().map(|case| case.stated.clone()).collect();
+    let (name, ranges, settled) = (mode.name.clone(), Vec::new(), Vec::new());
+    let mut tuned = Tuned { mode: name, arm, wanted, contacts, benches, features, ranges, settled };
     for case in &cases {
         let mut request = case.request.clone();
         request.set.extend(lift::settings(outline, mode, &adder, experiment::measured(outline.period_s)));
@@ -255,47 +285,6 @@ fn tune(args: &TuneArgs, shell: &Shell, request: &Request, outline: &Outline) ->
         tuned.settled.extend(trial.compare(&tuned.features, &case.object)?);
     }
     Ok(tuned)
-}
-
-/// What is measured: a graph on a bench, with a setting.
-struct Case {
-    request: Request,
-    outline: Outline,
-    /// The file of the bench.
-    file: Option<PathBuf>,
-    object: String,
-}
-
-impl Case {
-    /// Returns its contact, whose features are not known yet.
-    fn contact(&self) -> Contact {
-        Contact { object: self.object.clone(), latency_ms: 0.0, features: BTreeMap::new() }
-    }
-}
-
-/// Returns what is measured: each bench as it is, and with each of the settings. Simulated devices run long enough.
-fn cases(args: &TuneArgs, request: &Request, shell: &Shell) -> Result<Vec<Case>, String> {
-    let benches = [None].into_iter().chain(args.others.iter().map(Some));
-    let settings = || [None].into_iter().chain(args.also.iter().map(Some));
-    let each = benches.flat_map(|bench| settings().map(move |also| (bench, also)));
-    each.map(|(bench, also)| {
-        let mut request = Request { bench: bench.cloned().or_else(|| request.bench.clone()), ..request.clone() };
-        request.set.extend(also.cloned());
-        let compiled = compile(shell.catalogue(), &request).map_err(|report| report.render(false))?;
-        let outline = compiled.outline();
-        request.set.extend(experiment::long_enough(outline, experiment::duration(outline.period_s)));
-        let file = bench_file(outline);
-        let stem = file.as_ref().and_then(|file| file.file_stem()).map(|stem| stem.to_string_lossy().into_owned());
-        let with = also.map_or_else(String::new, |set| format!(" with {set}"));
-        let outline = outline.clone();
-        Ok(Case { request, outline, file, object: stem.unwrap_or_else(|| "object".into()) + &with })
-    })
-    .collect()
-}
-
-/// Returns the file of the bench that a request uses, as the places of its devices say.
-fn bench_file(outline: &Outline) -> Option<PathBuf> {
-    outline.devices.first().map(|device| PathBuf::from(&device.place.file))
 }
 
 /// Returns the name of what a feature measures.
@@ -320,49 +309,57 @@ const LEAST_SLIDE: f64 = 0.5;
 
 /// Part of the response that a fit may leave unexplained [1].
 const MAX_RESIDUAL: f64 = 0.3;
+/// The same for a place of which no two test signals say the same: each motion has another friction [1].
+const MAX_RESIDUAL_SLIDING: f64 = 0.2;
 
 /// Measures how a feature answers each component that moves it.
 fn identify(experiment: &Experiment<'_>, object: &str, period: f64, shell: &Shell) -> Result<Found, Stop> {
     let feature = experiment.feature;
-    let components: Vec<usize> = (0..6).filter(|i| feature.column[*i] != 0.0).collect();
     let mut found =
         Found { object: object.to_owned(), fits: Vec::new(), lines: Vec::new(), growth: None, refused: None };
-    for component in components {
-        let experiment = Experiment { component, ..experiment.clone() };
-        let known = known(feature, component, period);
-        match agreed(&experiment, shell)? {
-            Ok(Response { lines, growth }) => match fit(&lines, known) {
-                Ok(fit) if fit.residual > MAX_RESIDUAL => {
-                    found.refused = Some(format!(
-                        "a gain, a resonance and a latency leave {:.0} % of the response unexplained",
-                        100.0 * fit.residual
-                    ));
-                }
-                Ok(fit) if sticks(&quantity(feature), component, &fit) => {
-                    found.refused = Some(format!(
-                        "friction holds the contact: it follows {:.0} % of the motion",
-                        100.0 * fit.gain.abs()
-                    ));
-                }
-                Ok(fit) => {
-                    found.fits.push((COMPONENTS[component], fit));
-                    found.lines.push(lines);
-                    found.growth = growth.or(found.growth);
-                }
-                Err(few) => {
-                    found.refused = Some(format!(
-                        "only {few} of {} frequencies stand out of the noise, and a fit needs {ENOUGH}",
-                        lines.len()
-                    ));
-                }
-            },
-            Err(why) => found.refused = Some(why),
-        }
-        if found.refused.is_some() {
-            break;
+    for component in (0..6).filter(|i| feature.column[*i] != 0.0) {
+        let response = agreed(&Experiment { component, ..experiment.clone() }, shell)?;
+        let fitted = response.and_then(|response| Ok((fitted(feature, component, period, &response)?, response)));
+        match fitted {
+            Ok((fit, Response { lines, growth })) => {
+                found.fits.push((COMPONENTS[component], fit));
+                found.lines.push(lines);
+                found.growth = growth.or(found.growth);
+            }
+            Err(why) => {
+                found.refused = Some(why);
+                break;
+            }
         }
     }
     Ok(found)
+}
+
+/// Fits the response to one component.
+///
+/// # Errors
+/// If noise or friction leave it unknown.
+fn fitted(feature: &Feature, component: usize, period: f64, response: &Response) -> Result<Fit, String> {
+    let quantity = quantity(feature);
+    let fit = fit(&response.lines, known(feature, component, period)).map_err(|few| {
+        let all = response.lines.len();
+        format!("only {few} of {all} frequencies stand out of the noise, and a fit needs {ENOUGH}")
+    })?;
+    let slides = response.growth.is_some() && Answer::of_geometry(&quantity).is_some();
+    let (most, also) = match slides {
+        true => (MAX_RESIDUAL_SLIDING, ", and no two test signals agree"),
+        false => (MAX_RESIDUAL, ""),
+    };
+    let percent = 100.0 * fit.residual;
+    if fit.residual > most {
+        return Err(format!(
+            "a gain, a resonance and a latency leave {percent:.0} % of the response unexplained{also}"
+        ));
+    }
+    if sticks(&quantity, component, &fit) {
+        return Err(format!("friction holds the contact: it follows {:.0} % of the motion", 100.0 * fit.gain.abs()));
+    }
+    Ok(fit)
 }
 
 /// Returns whether a feature follows a motion by less than half of what geometry says, or the wrong way.

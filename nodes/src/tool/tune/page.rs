@@ -1,9 +1,11 @@
 //! What `tune` has found, as text.
 
 use std::fmt::Write;
+use std::path::Path;
 
 use tactflow_runtime::cli::table;
 
+use super::cases::Stated;
 use super::step::Step;
 use super::trial::Held;
 use super::{Found, Tuned, TunedFeature, save};
@@ -131,9 +133,17 @@ fn lines(tuned: &Tuned) -> String {
             let _ = writeln!(text, "gains.{}.{key} = {gain:?}", feature.name);
         }
     }
-    if tuned.contacts.iter().any(|contact| !contact.features.is_empty()) {
-        let _ = writeln!(text, "\n[facts.{}]                         # in the bench\ncontacts = [", tuned.arm);
-        for contact in tuned.contacts.iter().filter(|contact| !contact.features.is_empty()) {
+    if !tuned.ranges.is_empty() {
+        text += "\n[live]                              # in place of the old ranges\n";
+    }
+    for range in &tuned.ranges {
+        let _ = writeln!(text, "{} = {}", range.name, range.value());
+    }
+    for Stated { file, contacts } in tuned.stated() {
+        let file = file.as_deref().and_then(Path::file_name).map(|name| name.to_string_lossy().into_owned());
+        let file = file.unwrap_or_else(|| "the bench".into());
+        let _ = writeln!(text, "\n[facts.{}]                         # in {file}\ncontacts = [", tuned.arm);
+        for contact in &contacts {
             let _ = writeln!(text, "    {},", save::value(contact));
         }
         text += "]\n";

@@ -4,6 +4,7 @@ use tactflow_runtime::cli::Shell;
 use tactflow_runtime::graph::Outline;
 use toml_edit::{Array, InlineTable, Value};
 
+use super::cases::Stated;
 use super::{TuneArgs, Tuned, experiment};
 use crate::tool::control::contacts::{Answer, Contact};
 use crate::tool::guided::BenchFile;
@@ -17,30 +18,29 @@ pub(super) fn save(args: &TuneArgs, outline: &Outline, tuned: &Tuned, shell: &Sh
     let mode = outline.modes.iter().find(|mode| mode.name == tuned.mode);
     for one in &tuned.features {
         let (Some(pid), Some(mode), Some(new)) = (&one.feature.pid, mode, one.new) else { continue };
-        for ((key, old), gain) in
-            ["kp", "ki", "kd"].into_iter().zip(one.old).zip(new).filter(|((_, old), new)| old != new)
-        {
-            let _ = old;
+        let keys = ["kp", "ki", "kd"].into_iter().zip(one.old).zip(new);
+        for (key, gain) in keys.filter(|((_, old), new)| old != new).map(|((key, _), gain)| (key, gain)) {
             let path = experiment::gain_key(pid, &one.name, key, mode);
             let path: Vec<&str> = path.split('.').collect();
             let Some((last, section)) = path.split_last() else { continue };
             graph.set(section, last, gain)?;
         }
     }
+    for range in &tuned.ranges {
+        let path: Vec<&str> = ["live"].into_iter().chain(range.name.split('.')).collect();
+        let Some((last, section)) = path.split_last() else { continue };
+        graph.set(section, last, range.value())?;
+    }
     let mut files = vec![graph];
-    // A bench that was measured with several settings has a contact for each.
-    let measured =
-        tuned.files.iter().zip(&tuned.contacts).filter_map(|(file, contact)| Some((file.as_ref()?, contact)));
-    let measured: Vec<_> = measured.collect();
-    for same in measured.chunk_by(|(one, _), (other, _)| one == other) {
-        let Some((bench, _)) = same.first() else { continue };
+    for Stated { file: bench, contacts } in tuned.stated() {
+        let Some(bench) = bench else { continue };
         // A graph can have its own devices.
-        let is_graph = **bench == args.graph;
+        let is_graph = bench == args.graph;
         if !is_graph {
-            files.push(BenchFile::read(bench)?);
+            files.push(BenchFile::read(&bench)?);
         }
         let Some(file) = (if is_graph { files.first_mut() } else { files.last_mut() }) else { continue };
-        file.set(&["facts", &tuned.arm], "contacts", Array::from_iter(same.iter().map(|(_, contact)| value(contact))))?;
+        file.set(&["facts", &tuned.arm], "contacts", lines(&contacts))?;
         if !is_graph {
             file.check(shell.catalogue())?;
         }
@@ -50,10 +50,22 @@ pub(super) fn save(args: &TuneArgs, outline: &Outline, tuned: &Tuned, shell: &Sh
     Ok(written.collect::<String>().trim_end().to_owned())
 }
 
+/// Writes contacts as a list, each on its own line.
+fn lines(contacts: &[Contact]) -> Array {
+    let mut list = Array::from_iter(contacts.iter().map(value));
+    list.iter_mut().for_each(|contact| contact.decor_mut().set_prefix("\n  "));
+    list.set_trailing("\n");
+    list.set_trailing_comma(true);
+    list
+}
+
 /// Writes a contact as an inline table.
 pub(super) fn value(contact: &Contact) -> Value {
     let mut table = InlineTable::new();
     table.insert("object", contact.object.as_str().into());
+    if contact.latency_ms > 0.0 {
+        table.insert("latency_ms", contact.latency_ms.into());
+    }
     for (feature, answer) in &contact.features {
         table.insert(feature, inline(answer));
     }

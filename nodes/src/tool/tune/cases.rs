@@ -1,0 +1,67 @@
+//! What is measured: the graph on each bench, and with each setting.
+
+use std::collections::BTreeMap;
+use std::path::PathBuf;
+
+use tactflow_runtime::cli::Shell;
+use tactflow_runtime::graph::{Outline, Request, compile};
+
+use super::{TuneArgs, experiment};
+use crate::tool::control::contacts::{Contact, contacts};
+
+/// A bench, and the contacts that it states.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Stated {
+    pub(super) file: Option<PathBuf>,
+    pub(super) contacts: Vec<Contact>,
+}
+
+/// Returns the name of the role of the first arm.
+pub(super) fn arm_of(outline: &Outline) -> Option<&str> {
+    outline.commands.iter().find_map(|wire| wire.name.strip_suffix(".velocity"))
+}
+
+/// What is measured: a graph on a bench, with a setting.
+pub(super) struct Case {
+    pub(super) request: Request,
+    pub(super) outline: Outline,
+    pub(super) stated: Stated,
+    pub(super) object: String,
+}
+
+impl Case {
+    /// Returns its contact, whose features are not known yet.
+    pub(super) fn contact(&self) -> Contact {
+        Contact { object: self.object.clone(), latency_ms: 0.0, features: BTreeMap::new() }
+    }
+}
+
+/// Returns what is measured: each bench as it is, and with each of the settings. Simulated devices run long enough.
+pub(super) fn cases(args: &TuneArgs, request: &Request, shell: &Shell) -> Result<Vec<Case>, String> {
+    let benches = [None].into_iter().chain(args.others.iter().map(Some));
+    let settings = || [None].into_iter().chain(args.also.iter().map(Some));
+    let each = benches.flat_map(|bench| settings().map(move |also| (bench, also)));
+    each.map(|(bench, also)| {
+        let mut request = Request { bench: bench.cloned().or_else(|| request.bench.clone()), ..request.clone() };
+        request.set.extend(also.cloned());
+        let compiled = compile(shell.catalogue(), &request).map_err(|report| report.render(false))?;
+        let outline = compiled.outline();
+        request.set.extend(experiment::long_enough(outline, experiment::duration(outline.period_s)));
+        let arm = arm_of(outline).unwrap_or_default();
+        let stated = Stated { file: bench_file(outline), contacts: contacts(compiled.facts(), arm)? };
+        let stem = stated.file.as_ref().and_then(|file| file.file_stem());
+        let object = match &stated.contacts[..] {
+            [only] => Some(only.object.clone()),
+            _ => stem.map(|stem| stem.to_string_lossy().into_owned()),
+        };
+        let with = also.map_or_else(String::new, |set| format!(" with {set}"));
+        let outline = outline.clone();
+        Ok(Case { request, outline, stated, object: object.unwrap_or_else(|| "object".into()) + &with })
+    })
+    .collect()
+}
+
+/// Returns the file of the bench that a request uses, as the places of its devices say.
+fn bench_file(outline: &Outline) -> Option<PathBuf> {
+    outline.devices.first().map(|device| PathBuf::from(&device.place.file))
+}
