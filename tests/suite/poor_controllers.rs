@@ -12,7 +12,7 @@ use tactflow_runtime::graph::{Request, compile};
 use tactflow_runtime::source::{Diagnostic, Report};
 use tactflow_tests::{catalogue, toml_files, workspace};
 
-use good::{good, good_at_second_sight, good_behind_nodes, good_by_turns};
+use good::{good, good_at_second_sight, good_behind_nodes, good_by_modes, good_by_turns};
 use poor::{never_reached, opposed, poor_behind_nodes, poor_gains, poor_modes, poor_sums, wrong_columns};
 use variant::{graph, variant};
 
@@ -57,7 +57,7 @@ fn each_poor_controller_gets_its_warning_and_no_other() {
 
 #[test]
 fn no_good_controller_is_blamed() {
-    let good = [good(), good_behind_nodes(), good_at_second_sight(), good_by_turns()]
+    let good = [good(), good_behind_nodes(), good_at_second_sight(), good_by_turns(), good_by_modes()]
         .into_iter()
         .flatten()
         .collect::<Vec<_>>();

@@ -189,6 +189,18 @@ fn a_contact_that_stiffens_counts_with_the_largest_motion() {
 }
 
 #[test]
+fn a_loop_that_loses_its_contact_is_measured_again_with_smaller_gains() {
+    let swings = "devices.bench.damping_ratio=0.1";
+    let said = say(&["tune", "graphs/position.toml", "--feature", "x", "--format", "json", "--set", swings]);
+    assert_eq!(said.code, 0, "{}{}", said.out, said.err);
+    assert!(said.err.contains("`x`: again, with an eighth of its gains"), "{}", said.err);
+    let tuned: Value = serde_json::from_str(&said.out).unwrap();
+    let kp = tuned["features"][0]["new"][0].as_f64().unwrap();
+    // Of gains from a fourth of those of the task.
+    assert!((1.3..=2.0).contains(&kp), "{kp}");
+}
+
+#[test]
 fn a_loop_that_pushes_the_wrong_way_gets_no_gains() {
     // With a reversed column the contact leaves the pad, and the mode ends.
     let set = "nodes.jacobian.columns.x=[1, 0, 0, 0, 0, 0]";

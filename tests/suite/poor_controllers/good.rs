@@ -244,6 +244,24 @@ pub(super) fn good_by_turns() -> Vec<Variant> {
                 "set modes.servo.go={ to = \"approach\", when = \"kept.value\", above = 0.05, for_ms = 100 }",
             ],
         ),
+        // It waits at rest until it is touched, and approaches in another mode.
+        variant(
+            "force",
+            &[
+                "start = \"wait\"",
+                "+[modes.wait]",
+                "+set.projector.select = [0, 0, 0, 0, 0, 0]",
+                "+go = { to = \"servo\", when = \"touch.present\", for_ms = 40 }",
+                "+fail = { after_ms = 10000 }",
+                "set modes.servo.go={ to = \"approach\", on = \"again\" }",
+            ],
+        ),
+    ]
+}
+
+/// Good controllers whose modes bound an integral, let go, or search along the object, and columns that couple a little.
+pub(super) fn good_by_modes() -> Vec<Variant> {
+    vec![
         // An integral in a mode that a large error ends, as `within` would.
         variant(
             "edge",
@@ -276,17 +294,5 @@ pub(super) fn good_by_turns() -> Vec<Variant> {
         // Rolling that couples the axes a little, and a press that slides a little.
         variant("rolling", &["columns.x = [-1, 0, 0, 5, -20, 0]"]),
         variant("hybrid", &["columns.pressure = [0.3, 0, 1, 0, 0, 0]"]),
-        // It waits at rest until it is touched, and approaches in another mode.
-        variant(
-            "force",
-            &[
-                "start = \"wait\"",
-                "+[modes.wait]",
-                "+set.projector.select = [0, 0, 0, 0, 0, 0]",
-                "+go = { to = \"servo\", when = \"touch.present\", for_ms = 40 }",
-                "+fail = { after_ms = 10000 }",
-                "set modes.servo.go={ to = \"approach\", on = \"again\" }",
-            ],
-        ),
     ]
 }

@@ -157,6 +157,9 @@ struct Found {
     growth: Option<f64>,
     /// Why there is no fit.
     refused: Option<String>,
+    /// Whether a test signal has ended the mode.
+    #[serde(skip)]
+    is_lost: bool,
 }
 
 impl Tuned {
@@ -258,18 +261,21 @@ fn tune(args: &TuneArgs, shell: &Shell, request: &Request, outline: &Outline) ->
             let found = found.collect::<Result<Vec<Found>, Stop>>()?;
             Ok(propose(feature.clone(), found, &contacts, wanted, outline.period_s))
         };
-        let first = measure(HALF)?;
+        let say = |gains: &str| shell.say_beside(&format!("`{}`: again, with {gains}", feature.name));
+        let mut found = measure(HALF)?;
+        if found.answers.iter().any(|found| found.is_lost) {
+            // A loop that hardly holds the contact loses it with a test signal.
+            say("an eighth of its gains");
+            found = measure(HALF * QUARTER)?;
+        }
         // A stiff loop holds the contact against the test signal, and friction then hides more of the motion. A soft one
         // has not settled when the signal begins.
-        features.push(match first.factor().filter(|factor| !NEAR.contains(factor)) {
-            Some(factor) => {
-                let name = &feature.name;
-                shell.say_beside(&format!("`{name}`: again, with a quarter of the gains that were found"));
-                let again = measure(QUARTER * factor)?;
-                if again.new.is_some() { again } else { first }
-            }
-            None => first,
-        });
+        if let Some(factor) = found.factor().filter(|factor| !NEAR.contains(factor)) {
+            say("a quarter of the gains that were found");
+            let again = measure(QUARTER * factor)?;
+            found = if again.new.is_some() { again } else { found };
+        }
+        features.push(found);
     }
     let arm = arm_of(outline).unwrap_or_default().to_owned();
     let benches = cases.iter().map(|case| case.stated.clone()).collect();
@@ -315,11 +321,20 @@ const MAX_RESIDUAL_SLIDING: f64 = 0.2;
 /// Measures how a feature answers each component that moves it.
 fn identify(experiment: &Experiment<'_>, object: &str, period: f64, shell: &Shell) -> Result<Found, Stop> {
     let feature = experiment.feature;
-    let mut found =
-        Found { object: object.to_owned(), fits: Vec::new(), lines: Vec::new(), growth: None, refused: None };
+    let mut found = Found {
+        object: object.to_owned(),
+        fits: Vec::new(),
+        lines: Vec::new(),
+        growth: None,
+        refused: None,
+        is_lost: false,
+    };
     for component in (0..6).filter(|i| feature.column[*i] != 0.0) {
         let response = agreed(&Experiment { component, ..experiment.clone() }, shell)?;
-        let fitted = response.and_then(|response| Ok((fitted(feature, component, period, &response)?, response)));
+        let is_lost = response.as_ref().err().is_some_and(|refusal| refusal.is_lost);
+        let fitted = response
+            .map_err(|refusal| refusal.why)
+            .and_then(|response| Ok((fitted(feature, component, period, &response)?, response)));
         match fitted {
             Ok((fit, Response { lines, growth })) => {
                 found.fits.push((COMPONENTS[component], fit));
@@ -327,7 +342,11 @@ fn identify(experiment: &Experiment<'_>, object: &str, period: f64, shell: &Shel
                 found.growth = growth.or(found.growth);
             }
             Err(why) => {
-                found.refused = Some(why);
+                let lighter = match Answer::of_geometry(&quantity(feature)) {
+                    Some(_) if !is_lost => "; a lighter press has less friction",
+                    _ => "",
+                };
+                (found.refused, found.is_lost) = (Some(why + lighter), is_lost);
                 break;
             }
         }

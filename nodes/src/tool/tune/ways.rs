@@ -22,11 +22,18 @@ pub(super) struct Response {
     pub(super) growth: Option<f64>,
 }
 
+/// Why a response is not known.
+pub(super) struct Refusal {
+    pub(super) why: String,
+    /// Whether a test signal has ended the mode, so that smaller gains may help.
+    pub(super) is_lost: bool,
+}
+
 /// Moves further and further, as far as the task stays in its mode, and returns the response to the largest motions
 /// that agree. Friction hides a small motion, and gives two of them the same wrong response: no larger motion may have
 /// a larger one. If the last two only differ a little, the larger response counts, which has the smaller margins: a
 /// contact may stiffen when it is pressed further, and press less when it is nearly left.
-pub(super) fn agreed(experiment: &Experiment<'_>, shell: &Shell) -> Result<Result<Response, String>, Stop> {
+pub(super) fn agreed(experiment: &Experiment<'_>, shell: &Shell) -> Result<Result<Response, Refusal>, Stop> {
     let mut runs: Vec<Vec<Line>> = Vec::new();
     let mut stopped = None;
     let unit = if experiment.component < 3 { "m" } else { "rad" };
@@ -57,12 +64,14 @@ pub(super) fn agreed(experiment: &Experiment<'_>, shell: &Shell) -> Result<Resul
             return Ok(Ok(Response { lines, growth: Some(growth) }));
         }
     }
-    Ok(Err(match agree {
+    let is_lost = agree.is_none() && stopped.is_some();
+    let why = match agree {
         Some(_) => "friction holds the contact back: only the largest test signal moves it".into(),
         None => stopped.unwrap_or_else(|| {
             format!("no two test signals gave the same response at {ENOUGH} frequencies that stand out of the noise")
         }),
-    }))
+    };
+    Ok(Err(Refusal { why, is_lost }))
 }
 
 /// Returns the median difference of two responses, over the frequencies where the second motion was larger: 0 if none was,
