@@ -46,8 +46,9 @@ fn each_poor_controller_gets_its_warning_and_no_other() {
         for diagnostic in &report.diagnostics {
             let Some(text) = fixed(&report, diagnostic, &graph(variant.task)) else { continue };
             let after = variant.compiled(text).warnings();
-            if codes(after.as_ref()).contains(code) {
-                wrong.push(format!("{code}: {} stays after the fix {:?}", named(), diagnostic.help));
+            if !codes(after.as_ref()).is_empty() {
+                let left = codes(after.as_ref());
+                wrong.push(format!("{code}: {} still has {left:?} after the fix {:?}", named(), diagnostic.help));
             }
         }
     }

@@ -139,6 +139,13 @@ fn gains_beyond_their_live_range_are_tried_and_saved_with_a_wider_range() {
 }
 
 #[test]
+fn a_live_bound_of_a_feature_stays_as_it_is() {
+    let limit = "live.pid.gains.orientation.limit={ min = 0.2, max = 0.7, rate = 0.5 }";
+    let said = say(&["tune", "graphs/edge.toml", "--feature", "orientation", "--set", limit]);
+    assert_eq!(said.code, 0, "{}{}", said.out, said.err);
+}
+
+#[test]
 fn what_cannot_be_tuned_says_why() {
     for (args, why) in [
         (

@@ -1,5 +1,6 @@
 //! Controllers as an integrator may write them.
 
+use super::poor::HALF_TURN;
 use super::variant::{Variant, cleared, compared, graph, search, variant};
 
 /// The lines of all gains of a task, with each `kp` and `ki` times a factor.
@@ -284,6 +285,16 @@ pub(super) fn good_by_modes() -> Vec<Variant> {
                 "set modes.away.done={ after_travel_mm = 10, of = \"move.sensor_pose\" }",
             ],
         ),
+        // It leaves an object that presses too hard, and lifts off before it searches along the object.
+        variant(
+            "edge",
+            &[
+                "set modes.servo.go={ to = \"away\", when = \"touch.force\", above = 16.0, for_ms = 20 }",
+                "set modes.away.set.projector.select=[0, 0, 0, 0, 0, 0]",
+                "set modes.away.set.reach.twist=[0, 0, -0.01, 0, 0, 0]",
+                "set modes.away.done={ after_travel_mm = 10, of = \"move.sensor_pose\" }",
+            ],
+        ),
         // It searches a lost contact along the object, as fast as it approached.
         Variant {
             task: "hybrid",
@@ -294,5 +305,10 @@ pub(super) fn good_by_modes() -> Vec<Variant> {
         // Rolling that couples the axes a little, and a press that slides a little.
         variant("rolling", &["columns.x = [-1, 0, 0, 5, -20, 0]"]),
         variant("hybrid", &["columns.pressure = [0.3, 0, 1, 0, 0, 0]"]),
+        // A mount of half a turn about z, and columns in its frame.
+        variant(
+            "hybrid",
+            &[&HALF_TURN[..], &["columns.x = [1, 0, 0, 0, 0, 0]", "columns.y = [0, 1, 0, 0, 0, 0]"]].concat(),
+        ),
     ]
 }

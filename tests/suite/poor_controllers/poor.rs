@@ -85,6 +85,15 @@ pub(super) fn wrong_columns() -> Vec<(&'static str, Variant)> {
                 "select = [1, 0, 1, 0, 0, 1]",
             ],
         ),
+        with_feature(
+            "hold_without_slip",
+            "torque",
+            "shear.torque",
+            "[0, 0, 0, 0, 0, 1]",
+            &["select = [0, 0, 1, 0, 0, 1]"],
+        ),
+        // A pad that is mounted half a turn about z.
+        variant("hybrid", &HALF_TURN),
         with_feature("hold_without_slip", "fx", "shear.fx", "[0.01, 0, 0, 0, 0, 0]", &["select = [1, 0, 1, 0, 0, 0]"]),
         with_feature(
             "edge",
@@ -100,6 +109,16 @@ pub(super) fn wrong_columns() -> Vec<(&'static str, Variant)> {
     ];
     cases.into_iter().map(|variant| ("wrong-column", variant)).collect()
 }
+
+/// The motion of the features passes a mount that is turned by half a turn about z.
+pub(super) const HALF_TURN: [&str; 6] = [
+    "set nodes.mount.type=\"static_pose\"",
+    "set nodes.mount.rpy=[0, 0, 3.14159265]",
+    "set nodes.turned.type=\"adjoint\"",
+    "set nodes.turned.in.twist=\"projector.twist\"",
+    "set nodes.turned.in.pose=\"mount.pose\"",
+    "set nodes.sum.in.touch=\"turned.twist\"",
+];
 
 /// A task that controls a feature more, with a setpoint of 0 and a gain of 1 1/s.
 fn with_feature(task: &'static str, name: &str, port: &str, column: &str, changes: &[&str]) -> Variant {
@@ -148,6 +167,8 @@ pub(super) fn never_reached() -> Vec<(&'static str, Variant)> {
             ),
         ),
         ("unreachable-setpoint", variant("force", &["set parts.touch.set.label.min_force=16.0"])),
+        ("unreachable-setpoint", variant("hold_without_slip", &["set nodes.grip.least_force=20.0"])),
+        ("unreachable-setpoint", banded("edge", band("orientation", "{ inner = 0.5, outer = 1.6 }", "absent"))),
         ("unusual-gain", variant("rolling", &["gains.x = { kp = 2.0, limit = 0.0001 }"])),
         ("unusual-gain", variant("edge", &["gains.pressure = { kd = 0.05 }"])),
         ("unusual-gain", variant("hybrid", &["columns.x = [-0.001, 0, 0, 0, 0, 0]"])),
@@ -176,6 +197,8 @@ pub(super) fn poor_gains() -> Vec<(&'static str, Variant)> {
     let slow = "time_constant_ms = 1000";
     vec![
         ("low-margin", variant("hybrid", &["gains.x = { kp = 17.5 }"])),
+        // Its derivative alone takes the margins.
+        ("low-margin", variant("edge", &["gains.pressure = { kp = 0.4, kd = 0.3 }"])),
         ("low-margin", variant("hybrid", &["gains.pressure = { kp = 5.0, ki = 1.0, within = 0.02 }"])),
         ("low-margin", variant("hybrid", &["gains.pressure = { kp = 0.1, ki = 0.5, within = 0.02 }"])),
         ("low-margin", variant("position", &["gains.x = { kp = 17.5 }"])),
@@ -308,7 +331,6 @@ pub(super) fn poor_sums() -> Vec<(&'static str, Variant)> {
             ),
         ),
         ("unused-column", gated_above("4.0")),
-        ("unused-column", gated_above("0.25")),
         // Two controllers of forces that press together.
         (
             "low-margin",
@@ -355,6 +377,8 @@ pub(super) fn opposed() -> Vec<(&'static str, Variant)> {
                 &["set nodes.pid.gains.force.ki=0.2", "set nodes.pid.gains.force.within=0.5"],
             ),
         ),
+        // It rests 2.9 mm beside the middle.
+        ("opposed-motion", variant("hybrid", &["set modes.servo.set.reach.twist=[0.01, 0, 0, 0, 0, 0]"])),
         // The line is turned to y, and longer than the pad.
         (
             "line-position",

@@ -129,7 +129,7 @@ impl Gains {
                 "the control of `{name}` is at its limit of {limit} {unit}/s from an error of {error:.1e} {unit} on: noise \
                  alone decides in which direction it moves"
             );
-            let help = format!("write `limit = {:.4}` or more, or remove it", 10.0 * self.kp * SMALL_ERROR);
+            let help = format!("write `limit = {:.1e}` or more, or remove it", 10.0 * self.kp * SMALL_ERROR);
             return Some(warn(Code::UnusualGain, "limit", message)?.help(help));
         }
         let (step, max) = (self.kp * period, MAX_STABLE_STEP / period);

@@ -1,18 +1,24 @@
 //! From the twist of an arm back to all that moves it.
 
+use nalgebra::{Matrix6, Vector6};
 use tactflow_runtime::graph::OutlinedBlock;
+use tactflow_runtime::signal::{Pose, Twist};
 
 use super::filters::Filter;
 use super::law::{Constant, Feature, Guidance, Law, feature};
 use super::settings::{Nodes, source};
 use super::shape::Shape;
 use crate::motion::COMPONENTS;
+use crate::motion::adjoint::adjoint;
+use crate::motion::pose::pose_of;
 
 /// What stands between a node and the twist of the arm.
 #[derive(Debug, Clone)]
 struct Passage {
-    /// Components that the projectors pass.
-    passes: [bool; 6],
+    /// What the projectors, and the adjoints of poses that do not change, make of a twist.
+    matrix: Matrix6<f64>,
+    /// The last adjoint of a pose that does not change.
+    turned: Option<String>,
     gates: Vec<String>,
     /// Switches whose selection is not known, with the number of the side.
     sides: Vec<(String, usize)>,
@@ -21,19 +27,34 @@ struct Passage {
 
 impl Default for Passage {
     fn default() -> Self {
-        Self { passes: [true; 6], gates: Vec::new(), sides: Vec::new(), delays: Vec::new() }
+        Self { matrix: Matrix6::identity(), turned: None, gates: Vec::new(), sides: Vec::new(), delays: Vec::new() }
     }
 }
 
 impl Passage {
-    /// Returns a twist without the components that do not pass.
-    fn masked(&self, values: [f64; 6]) -> [f64; 6] {
-        std::array::from_fn(|i| if self.passes[i] { values[i] } else { 0.0 })
+    /// Returns what becomes of a twist.
+    fn of(&self, twist: [f64; 6]) -> [f64; 6] {
+        // Half a turn leaves no digits behind.
+        let clean = |part: f64| if part.abs() < 1e-12 { 0.0 } else { part };
+        (self.matrix * Vector6::from(twist)).map(clean).into()
     }
 
     /// Returns the way before a node that passes these components.
     fn selecting(&self, selects: impl Fn(usize) -> bool) -> Self {
-        Self { passes: std::array::from_fn(|i| self.passes[i] && selects(i)), ..self.clone() }
+        let selected = Matrix6::from_diagonal(&Vector6::from_fn(|i, _| f64::from(selects(i))));
+        Self { matrix: self.matrix * selected, ..self.clone() }
+    }
+
+    /// Returns the way before the adjoint of a pose.
+    fn turned(&self, node: &str, pose: &Pose) -> Self {
+        let columns: [Vector6<f64>; 6] = std::array::from_fn(|i| adjoint(pose, &Twist(Vector6::ith(i, 1.0))).0);
+        let turned = Some(node.to_owned());
+        Self { matrix: self.matrix * Matrix6::from_columns(&columns), turned, ..self.clone() }
+    }
+
+    /// Returns the components of the arm that a node behind it can move.
+    fn moves(&self) -> [bool; 6] {
+        std::array::from_fn(|i| self.matrix.row(i).iter().any(|entry| entry.abs() > 1e-12))
     }
 
     /// Returns the way before a gate.
@@ -91,6 +112,11 @@ fn collect<'a>(nodes: &Nodes<'a>, port: &str, passage: &Passage, law: &mut Law, 
     let mut follow = |input: &str, passage: &Passage, law: &mut Law| {
         source(node, input).into_iter().for_each(|twist| collect(nodes, twist, passage, law, path));
     };
+    if let Some(pose) = still_pose(nodes, node) {
+        follow("twist", &passage.turned(&node.name, &pose), law);
+        path.pop();
+        return;
+    }
     match node.kind.text.as_str() {
         "twist_adder" => node.wires.iter().for_each(|wire| follow(&wire.name, passage, law)),
         "projector" => {
@@ -110,23 +136,32 @@ fn collect<'a>(nodes: &Nodes<'a>, port: &str, passage: &Passage, law: &mut Law, 
         "twist_source" => law.constants.extend(constant(nodes, node, passage)),
         "inverse_jacobian" => {
             let columns = nodes.values(node).filter_map(|(path, setting)| {
-                Some((path.strip_prefix("columns.")?.to_owned(), passage.masked(setting.value.read()?)))
+                Some((path.strip_prefix("columns.")?.to_owned(), passage.of(setting.value.read()?)))
             });
             law.features.extend(columns.map(|(name, column)| {
                 let mut feature = feature(nodes, node, name, column);
                 feature.gates.extend(passage.gates.iter().cloned());
                 feature.filters.extend(passage.delays.iter().cloned());
                 feature.sides.clone_from(&passage.sides);
+                feature.turned.clone_from(&passage.turned);
                 feature
             }));
         }
         kind => {
             let is_wired = |i: usize| kind != "compose_twist" || source(node, COMPONENTS[i]).is_some();
-            let (port, passes) = (port.to_owned(), passage.selecting(is_wired).passes);
+            let (port, passes) = (port.to_owned(), passage.selecting(is_wired).moves());
             law.guidance.push(Guidance { port, kind: kind.to_owned(), passes, is_free: passage.is_free(nodes) });
         }
     }
     path.pop();
+}
+
+/// Returns the pose of an `adjoint`, if it does not change.
+fn still_pose(nodes: &Nodes<'_>, node: &OutlinedBlock) -> Option<Pose> {
+    let adjoint = Some(node).filter(|node| node.kind.text == "adjoint")?;
+    let pose = nodes.writer(source(adjoint, "pose")?).filter(|node| node.kind.text == "static_pose")?;
+    let read = |key: &str| nodes.value(pose, key).map_or(Some([0.0; 3]), |value| value.value.read());
+    Some(Pose(pose_of(read("xyz")?, read("rpy")?)))
 }
 
 /// Adds what moves the sides of a switch.
@@ -139,9 +174,13 @@ fn switch<'a>(nodes: &Nodes<'a>, node: &'a OutlinedBlock, passage: &Passage, law
     }
 }
 
-/// Returns the constant motion of a node; `None` if it is zero.
+/// Returns the constant motion of a node; `None` if it is zero, or if its gate is closed in this mode.
 fn constant(nodes: &Nodes<'_>, node: &OutlinedBlock, passage: &Passage) -> Option<Constant> {
-    let twist = passage.masked(nodes.value(node, "twist").and_then(|twist| twist.value.read()).unwrap_or_default());
-    let is_free = passage.is_free(nodes) && source(node, "gate").is_none();
+    let twist = passage.of(nodes.value(node, "twist").and_then(|twist| twist.value.read()).unwrap_or_default());
+    let open = source(node, "gate").map_or(Some(true), |gate| nodes.is_set(gate));
+    if open == Some(false) {
+        return None;
+    }
+    let is_free = passage.is_free(nodes) && open == Some(true);
     twist.iter().any(|part| *part != 0.0).then(|| Constant { node: node.name.clone(), twist, is_free })
 }

@@ -3,6 +3,7 @@
 use serde::Serialize;
 use tactflow_runtime::graph::OutlinedBlock;
 
+use super::contacts::Contact;
 use super::filters::{Filter, way};
 use super::schedule::Schedule;
 use super::settings::{Nodes, source};
@@ -46,6 +47,9 @@ pub(crate) struct Feature {
     /// The flags without which it moves nothing.
     #[serde(skip)]
     pub(crate) gates: Vec<String>,
+    /// The `adjoint` that turns its column.
+    #[serde(skip)]
+    pub(crate) turned: Option<String>,
     /// The switches that it passes, with the number of the side, where the selection is not known.
     #[serde(skip)]
     pub(crate) sides: Vec<(String, usize)>,
@@ -110,6 +114,13 @@ impl Feature {
     /// Returns whether it presses, and moves the sensor in no other way.
     pub(crate) fn presses_alone(&self) -> bool {
         (0..6).all(|i| (self.column[i] != 0.0) == (i == 2))
+    }
+
+    /// Returns what adds to its loop over these contacts: of another measurement, only what one of them states.
+    pub(crate) fn added<'f>(&'f self, contacts: &'f [Contact]) -> impl Iterator<Item = &'f Self> {
+        let is_stated =
+            |other: &Self| contacts.iter().any(|contact| other.quantity().and_then(|it| contact.answer(it)).is_some());
+        self.beside.iter().filter(move |other| other.measured == self.measured || is_stated(other))
     }
 
     /// Returns the name of what is measured, as a bench states it.
@@ -192,7 +203,7 @@ pub(super) fn feature<'a>(nodes: &Nodes<'a>, jacobian: &'a OutlinedBlock, name: 
     let way = error.and_then(|error| source(error, &name)).map(|port| way(nodes, port));
     let measured = way.as_ref().map(|way| way.measured.clone());
     let (filters, gates) = way.map(|way| (way.filters, way.gates)).unwrap_or_default();
-    let sides = Vec::new();
+    let (sides, turned) = (Vec::new(), None);
     let [kp, ki, kd] = ["kp", "ki", "kd"].map(|which| number(which).unwrap_or(0.0));
     let rise = number("rise");
     let compared = error.map(|error| error.name.clone());
@@ -210,6 +221,7 @@ pub(super) fn feature<'a>(nodes: &Nodes<'a>, jacobian: &'a OutlinedBlock, name: 
         setpoint,
         filters,
         gates,
+        turned,
         sides,
         schedules,
         name,

@@ -29,6 +29,8 @@ pub(crate) struct Loop {
     pub(crate) period: f64,
     /// What was measured, as a multiple of the model, at circular frequencies from low to high [rad/s]; empty if nothing was.
     measured: Vec<(f64, Complex<f64>)>,
+    /// Whether it answers the measurement of the loop that it adds to.
+    is_same_measurement: bool,
     /// Loops of the same measurement, or through the same motion, which add to this one.
     beside: Vec<Self>,
 }
@@ -56,7 +58,8 @@ impl Loop {
             if is_needed && around.is_none() {
                 return None;
             }
-            beside.extend(around);
+            let is_same_measurement = other.measured == feature.measured;
+            beside.extend(around.map(|around| Self { is_same_measurement, ..around }));
         }
         (around.gain != 0.0).then_some(Self { beside, ..around.times(factor) })
     }
@@ -67,7 +70,8 @@ impl Loop {
         let Feature { kp, ki, kd, .. } = *feature;
         let shapes = feature.filters.iter().map(|filter| filter.shape).collect();
         let (resonance, measured, beside) = (answer.resonance(), Vec::new(), Vec::new());
-        Self { kp, ki, kd, shapes, gain, resonance, latency, period, measured, beside }
+        let is_same_measurement = true;
+        Self { kp, ki, kd, shapes, gain, resonance, latency, period, measured, is_same_measurement, beside }
     }
 
     /// Returns the same loop with all gains of the controller times a factor. Those of the loops beside it stay.
@@ -84,7 +88,9 @@ impl Loop {
     /// Returns the same loop as it was measured: as a multiple of the model, at circular frequencies from low to high
     /// [rad/s].
     pub(crate) fn measured(&self, measured: Vec<(f64, Complex<f64>)>) -> Self {
-        let beside = self.beside.iter().map(|other| other.measured(measured.clone())).collect();
+        let of =
+            |other: &Self| if other.is_same_measurement { other.measured(measured.clone()) } else { other.clone() };
+        let beside = self.beside.iter().map(of).collect();
         Self { measured, beside, ..self.clone() }
     }
 

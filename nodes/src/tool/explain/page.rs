@@ -77,7 +77,7 @@ fn law(mode: &ModeLaw, style: &Style) -> String {
     let moving = || law.features.iter().filter(|one| one.moves());
     text += &moving().flat_map(|one| one.schedules.iter().map(|schedule| scheduled(one, schedule))).collect::<String>();
     text += &moving().filter_map(rising).collect::<String>();
-    text += &moving().filter_map(together).collect::<String>();
+    text += &moving().filter_map(|feature| together(feature, &mode.loops)).collect::<String>();
     let off: Vec<String> =
         law.features.iter().filter(|one| !one.moves()).map(|one| format!("`{}`", one.name)).collect();
     if !off.is_empty() {
@@ -126,16 +126,18 @@ fn rising(feature: &Feature) -> Option<String> {
 }
 
 /// Says what else answers the same measurement, or presses too.
-fn together(feature: &Feature) -> Option<String> {
-    let measured = feature.measured.as_ref().filter(|_| !feature.beside.is_empty())?;
-    // Once for all that answer it.
-    if feature.beside.iter().any(|other| other.id() < feature.id()) {
+fn together(feature: &Feature, loops: &[Stability]) -> Option<String> {
+    let measured = feature.measured.as_ref()?;
+    let is_known = |name: &str| loops.iter().any(|one| one.feature == name && one.margins.is_some());
+    let is_added = |other: &&Feature| other.measured == feature.measured || is_known(&other.name);
+    let others: Vec<&Feature> = feature.beside.iter().filter(is_added).collect();
+    // Once for all that add up.
+    if others.is_empty() || others.iter().any(|other| other.id() < feature.id()) {
         return None;
     }
-    let others: Vec<String> =
-        feature.beside.iter().map(|other| format!("`{}` of `{}`", other.name, other.jacobian)).collect();
+    let is_same = others.iter().all(|other| other.measured == feature.measured);
+    let others: Vec<String> = others.iter().map(|other| format!("`{}` of `{}`", other.name, other.jacobian)).collect();
     let (name, jacobian, others) = (&feature.name, &feature.jacobian, others.join(" and "));
-    let is_same = feature.beside.iter().all(|other| other.measured == feature.measured);
     let what = if is_same { format!("answer `{measured}`") } else { "move `vz`".into() };
     Some(format!("`{name}` of `{jacobian}` and {others} {what} together: their margins are those of the sum.\n"))
 }

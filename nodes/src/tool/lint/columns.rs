@@ -1,14 +1,16 @@
 //! Columns: those that increase an error, those that change another feature, and those that nothing uses.
 
 use std::collections::BTreeSet;
+use std::f64::consts::FRAC_PI_2;
 
 use tactflow_runtime::graph::OutlinedBlock;
 use tactflow_runtime::source::{Code, Diagnostic, Diagnostics, Edit, Item};
 
-use super::lines::{line_angle, line_axis};
+use super::lines::{ALONG, line_angle, line_axis};
 use super::rows::{Answer, Row};
 use super::{Controlled, ModeLaw};
 use crate::motion::COMPONENTS;
+use crate::motion::axis::wrap_axial;
 use crate::tool::control::collect::law;
 use crate::tool::control::contacts::Contact;
 use crate::tool::control::law::{Feature, Law};
@@ -28,16 +30,19 @@ pub(super) fn check(arm: &Controlled<'_>, found: &mut Diagnostics) {
 /// Returns the warning about a column that increases the error of its feature, or that does not change the feature.
 fn wrong(arm: &Controlled<'_>, mode: &ModeLaw<'_>, feature: &Feature) -> Option<Diagnostic> {
     let Some((quantity, row)) = mode.quantity(feature).and_then(|quantity| Some((quantity, Row::of(quantity)?))) else {
-        return offset(mode, feature).or_else(|| reversed(arm, mode, feature));
+        return reversed(arm, mode, feature).or_else(|| offset(arm, mode, feature));
     };
+    if let Some(turner) = &feature.turned {
+        return turned(mode, feature, quantity, row, turner);
+    }
     let column = mode.column(feature)?;
     if !row.changes(&column) {
-        return row.is_needed.then(|| foreign(mode, feature, quantity, column)).flatten();
+        return if row.is_needed { foreign(mode, feature, quantity, column) } else { reversed(arm, mode, feature) };
     }
     if !row.changes(&feature.column) {
-        return row.is_needed.then(|| blocked(mode, feature, &row));
+        return if row.is_needed { Some(blocked(mode, feature, &row)) } else { reversed(arm, mode, feature) };
     }
-    if let Some(aside) = aside(mode, feature, quantity, column) {
+    if let Some(aside) = aside(arm, mode, feature, (quantity, column)) {
         return Some(aside);
     }
     let is_reversed = |answer: &&Answer| {
@@ -59,26 +64,58 @@ fn wrong(arm: &Controlled<'_>, mode: &ModeLaw<'_>, feature: &Feature) -> Option<
     Some(replaced(mode, feature, message, right))
 }
 
-/// The components that move a contact along x and along y: by sliding, and by rolling.
-const ALONG_X_AND_Y: [[usize; 2]; 2] = [[0, 1], [4, 3]];
+/// Returns the warning about a column that is right in the frame in which it is written, and wrong behind the adjoint of a
+/// pose.
+fn turned(mode: &ModeLaw<'_>, feature: &Feature, quantity: &str, row: Row, turner: &str) -> Option<Diagnostic> {
+    let is_wrong = |answer: &Answer| feature.column[answer.component] * answer.sign < 0.0;
+    let aside = pairs(quantity).iter().any(|[own, other]| feature.column[*other].abs() > feature.column[*own].abs());
+    if !row.known.iter().any(is_wrong) && !aside && (row.changes(&feature.column) || !row.is_needed) {
+        return None;
+    }
+    let name = &feature.name;
+    let message = format!(
+        "behind `{turner}`, the column of `{name}` is {}, which does not reduce its error",
+        array(&feature.column.map(three_digits))
+    );
+    let help = format!(
+        "write the column in the frame before `{turner}`, or check its pose: `{name}` answers to {}",
+        row.components(" and ")
+    );
+    Some(Diagnostic::new(Code::WrongColumn, mode.place_of_column(feature), message).help(help))
+}
+
+/// Returns the components that change a quantity, each with one that changes another quantity.
+fn pairs(quantity: &str) -> &'static [[usize; 2]] {
+    match quantity {
+        "x" => &[[0, 1], [4, 3]],
+        "y" => &[[1, 0], [3, 4]],
+        "pressure" | "force" => &[[2, 0], [2, 1]],
+        _ => &[],
+    }
+}
 
 /// Returns the warning about a column that slides or rolls a contact more along the other axis than along its own, or that
 /// slides it more than it presses. With two such columns the contact circles around its setpoint, or runs away from it.
-fn aside(mode: &ModeLaw<'_>, feature: &Feature, quantity: &str, column: [f64; 6]) -> Option<Diagnostic> {
+fn aside(
+    arm: &Controlled<'_>,
+    mode: &ModeLaw<'_>,
+    feature: &Feature,
+    (quantity, column): (&str, [f64; 6]),
+) -> Option<Diagnostic> {
     let name = &feature.name;
-    let pairs: &[[usize; 2]] = match quantity {
-        "x" => &ALONG_X_AND_Y,
-        "y" => &[[1, 0], [3, 4]],
-        "pressure" | "force" => &[[2, 0], [2, 1]],
-        _ => return None,
+    let pairs = pairs(quantity);
+    let answers = || arm.contacts.iter().filter_map(|contact| contact.features.get(quantity));
+    let is_aside = |[own, other]: &&[usize; 2]| {
+        // A bench that states an answer to the other component knows more.
+        let is_stated = answers().any(|answer| answer.row()[*other] != 0.0);
+        !is_stated && feature.column[*other].abs() > feature.column[*own].abs()
     };
-    let is_aside = |pair: &&[usize; 2]| feature.column[pair[1]].abs() > feature.column[pair[0]].abs();
     let [own, other] = *pairs.iter().find(is_aside)?;
     let mut right = column;
     for [own, other] in pairs {
         let known = Row::of(quantity)?.known.iter().find(|answer| answer.component == *own)?;
         let size = if *own == 2 { column[*own].abs() } else { column[*own].hypot(column[*other]) };
-        (right[*own], right[*other]) = (known.sign * (size * 1e3).round() / 1e3, 0.0);
+        (right[*own], right[*other]) = (known.sign * three_digits(size), 0.0);
     }
     let message = format!(
         "the column of `{name}` moves the sensor more with `{}`, which does not change `{quantity}`, than with `{}`, which does",
@@ -87,13 +124,23 @@ fn aside(mode: &ModeLaw<'_>, feature: &Feature, quantity: &str, column: [f64; 6]
     Some(replaced(mode, feature, message, right))
 }
 
+/// Returns a number with three digits.
+fn three_digits(number: f64) -> f64 {
+    format!("{number:.2e}").parse().unwrap_or(number)
+}
+
 /// Returns the warning about a column that increases the offset of a line. The direction of the line is the setpoint of
 /// its angle, and the offset is positive on the side of the direction turned by +90 degrees.
-fn offset(mode: &ModeLaw<'_>, feature: &Feature) -> Option<Diagnostic> {
-    if mode.quantity(feature)? != "offset" {
+fn offset(arm: &Controlled<'_>, mode: &ModeLaw<'_>, feature: &Feature) -> Option<Diagnostic> {
+    let is_stated = arm.contacts.iter().any(|contact| contact.features.contains_key("offset"));
+    if mode.quantity(feature)? != "offset" || is_stated {
         return None;
     }
-    let angle = line_angle(mode)?;
+    // Where the direction wraps from pi/2 to -pi/2, the offset changes its sign.
+    let angle = wrap_axial(line_angle(mode)?);
+    if angle.abs() > FRAC_PI_2 - ALONG {
+        return None;
+    }
     let (across_x, across_y) = (libm::sin(angle), -libm::cos(angle));
     let column = mode.column(feature)?;
     if across_x * feature.column[0] + across_y * feature.column[1] >= 0.0 {

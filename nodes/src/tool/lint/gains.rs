@@ -1,10 +1,9 @@
 //! Gains that do harm whatever is touched: derivatives of noise, integrals that wind up, and gains of zero.
 
-use std::f64::consts::FRAC_PI_2;
-
 use tactflow_runtime::source::{Code, Diagnostic, Diagnostics, Edit};
 
-use super::reach::{deadband, force_limit, setpoint};
+use super::reach::{deadband, largest_error, setpoint};
+use super::stability::rounded;
 use super::{Controlled, ModeLaw};
 use crate::tool::control::contacts::Answer;
 use crate::tool::control::law::Feature;
@@ -37,15 +36,12 @@ const SLOW: f64 = 1.0 / 60.0;
 /// limit that is too small.
 fn slow(arm: &Controlled<'_>, mode: &ModeLaw<'_>, feature: &Feature) -> Option<Diagnostic> {
     let quantity = mode.quantity(feature)?;
-    let geometry = Answer::of_geometry(quantity);
-    let answers = arm.contacts.iter().filter_map(|contact| contact.features.get(quantity)).chain(&geometry);
-    let gain = answers.map(|answer| answer.along(&feature.column)).fold(0.0, f64::max);
-    let rate = feature.kp * gain;
-    if let Some(limited) = limited(mode, feature, quantity, gain) {
-        return Some(limited);
-    }
-    if rate <= 0.0 || rate >= SLOW || feature.ki > 0.0 || !feature.beside.is_empty() {
-        return None;
+    let gain = largest_gain(arm, feature, quantity)?;
+    let scheduled = feature.schedules.iter().map(|schedule| schedule.max.max(1.0)).product::<f64>();
+    let rate = feature.kp * scheduled * gain;
+    let is_alone = feature.ki == 0.0 && feature.beside.is_empty();
+    if rate >= SLOW || !is_alone {
+        return limited(mode, feature, quantity, gain);
     }
     let (name, time) = (&feature.name, (1.0 / rate).round());
     let message = format!("the loop of `{name}` takes {time} s for two thirds of an error: it hardly moves the sensor");
@@ -54,14 +50,27 @@ fn slow(arm: &Controlled<'_>, mode: &ModeLaw<'_>, feature: &Feature) -> Option<D
     Some(Diagnostic::new(Code::UnusualGain, mode.place_of_column(feature), message).help(help))
 }
 
+/// Returns the largest change of a feature for one unit of its control: as the contacts of the bench say, or by geometry.
+/// By how much it rolls, nothing says.
+fn largest_gain(arm: &Controlled<'_>, feature: &Feature, quantity: &str) -> Option<f64> {
+    let stated: Vec<&Answer> = arm.contacts.iter().filter_map(|contact| contact.features.get(quantity)).collect();
+    let rolls = |i: &usize| feature.column[*i] != 0.0 && !stated.iter().any(|answer| answer.row()[*i] != 0.0);
+    if matches!(quantity, "x" | "y") && [3, 4].iter().any(rolls) {
+        return None;
+    }
+    let geometry = Answer::of_geometry(quantity);
+    let gains = stated.into_iter().chain(&geometry).map(|answer| answer.along(&feature.column));
+    gains.reduce(f64::max).filter(|gain| *gain > 0.0)
+}
+
 /// Returns the warning about a limit with which a usual error takes minutes.
 fn limited(mode: &ModeLaw<'_>, feature: &Feature, quantity: &str, gain: f64) -> Option<Diagnostic> {
     let (usual, unit) = match quantity {
-        "x" | "y" => (0.01, "m"),
+        "x" | "y" => (0.01_f64.min(mode.farthest(feature)?), "m"),
         "orientation" => (0.5, "rad"),
         _ => return None,
     };
-    let limit = mode.limit(feature).filter(|limit| limit * gain > 0.0)?;
+    let limit = mode.limit(feature)?;
     let time = usual / (limit * gain);
     if time * SLOW <= 1.0 {
         return None;
@@ -70,7 +79,8 @@ fn limited(mode: &ModeLaw<'_>, feature: &Feature, quantity: &str, gain: f64) -> 
     let message = format!(
         "the control of `{name}` has a limit of {limit} {unit}/s: an error of {usual} {unit} takes {time:.0} s"
     );
-    let help = format!("write a `limit` of {} {unit}/s or more, or remove it", usual);
+    let least = rounded(usual / gain, libm::ceil);
+    let help = format!("write a `limit` of {least} {unit}/s or more, or remove it");
     Some(Diagnostic::new(Code::UnusualGain, place, message).help(help))
 }
 
@@ -96,19 +106,6 @@ fn unfiltered(mode: &ModeLaw<'_>, feature: &Feature) -> Option<Diagnostic> {
     Some(Diagnostic::new(Code::UnfilteredDerivative, mode.place_of_gain(feature, "kd"), message).help(help))
 }
 
-/// Returns the largest error that a feature can have, as far as it is known.
-fn largest_error(arm: &Controlled<'_>, mode: &ModeLaw<'_>, feature: &Feature) -> f64 {
-    match mode.quantity(feature) {
-        Some("orientation") => FRAC_PI_2,
-        Some(quantity @ ("pressure" | "force")) => {
-            // At the first touch it is the setpoint.
-            let most = force_limit(arm, mode, quantity).map_or(f64::INFINITY, |(most, _)| most);
-            feature.setpoint.filter(|setpoint| *setpoint > 0.0).map_or(most, |setpoint| most.min(setpoint))
-        }
-        _ => mode.farthest(feature).unwrap_or(f64::INFINITY),
-    }
-}
-
 /// Returns the warning about an integral that goes on to move its feature while a deadband lets it rest.
 fn hunting(mode: &ModeLaw<'_>, feature: &Feature) -> Option<Diagnostic> {
     let (name, band) = (&feature.name, deadband(mode, feature)?);
@@ -127,7 +124,8 @@ fn hunting(mode: &ModeLaw<'_>, feature: &Feature) -> Option<Diagnostic> {
     Some(diagnostic.help(format!("write `inside = {right}`")).edit(Edit::Replace(place, right.into())))
 }
 
-/// Returns the error at which a mode is left for one in which the feature has no integral.
+/// Returns the error at which a mode is left for one in which the feature has no integral. That of a force is large before
+/// it is pressed, and that of a place can be large in both directions.
 fn left_at(arm: &Controlled<'_>, mode: &ModeLaw<'_>, feature: &Feature) -> Option<f64> {
     let error = format!("{}.error.{}", feature.compared.as_ref()?, feature.name);
     let rests = |name: &str| {
@@ -135,8 +133,15 @@ fn left_at(arm: &Controlled<'_>, mode: &ModeLaw<'_>, feature: &Feature) -> Optio
         let mut features = other.into_iter().flat_map(|mode| &mode.law.features);
         features.any(|one| one.id() == feature.id() && one.ki == 0.0)
     };
-    let mut exits = mode.exits("go").filter(|exit| exit.word("when").is_some_and(|port| error.ends_with(port)));
-    exits.find(|exit| rests(exit.to))?.number("above")
+    let is_own = |port: &str| port == error || error.ends_with(&format!(".{port}"));
+    let exits = mode.exits("go").filter(|exit| exit.word("when").is_some_and(is_own) && rests(exit.to));
+    let exits: Vec<_> = exits.collect();
+    let above = exits.iter().find_map(|exit| exit.number("above"))?;
+    let below = exits.iter().find_map(|exit| exit.number("below"));
+    match mode.quantity(feature) {
+        Some("pressure" | "force") => Some(above),
+        _ => below.map(|below| above.max(-below)),
+    }
 }
 
 /// Returns the warning about an integral that grows at every error, up to a motion at full speed.

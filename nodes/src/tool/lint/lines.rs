@@ -3,15 +3,19 @@
 use std::f64::consts::{FRAC_PI_2, PI};
 use std::fmt;
 
-use tactflow_runtime::source::{Code, Diagnostic, Diagnostics, Item, Table};
+use nalgebra::Vector3;
+use tactflow_runtime::source::{Code, Diagnostic, Diagnostics, Table, Value};
 
 use super::{Controlled, ModeLaw};
+use crate::motion::pose::pose_of;
 use crate::tool::control::law::{Feature, Guidance};
 
 /// Nodes that guide the sensor along a line.
 const LINE_GUIDES: [&str; 2] = ["ridge_guide", "follow_path"];
 /// Largest angle between a line and an axis of the sensor along which the line lies [rad].
-const ALONG: f64 = 0.35;
+pub(super) const ALONG: f64 = 0.35;
+/// Largest part of an axis along z of the sensor with which it lies in the plane of the pad [1].
+const LYING: f64 = 0.5;
 
 pub(super) fn check(arm: &Controlled<'_>, found: &mut Diagnostics) {
     found.extend(arm.modes.iter().filter_map(|mode| along_line(arm, mode)));
@@ -37,7 +41,7 @@ fn along_line(arm: &Controlled<'_>, mode: &ModeLaw<'_>) -> Option<Diagnostic> {
         mode.moving().find(|feature| mode.quantity(feature) == Some(axis) && feature.column[i] != 0.0)
     };
     let feature = held(usize::from(*positions.first()? == "y")).filter(|_| along(&|i| held(i).is_some()))?;
-    let stated = stated(arm, mode, feature);
+    let stated = shortest_line(arm, mode, feature);
     let why = match constants.next().map(|constant| &*constant.node).or_else(guide) {
         Some(follower) if stated.as_ref().is_none_or(Line::is_longer) => format!("the line that `{follower}` follows"),
         // It crawls along the line, which matters where nothing but the end of the contact ends it.
@@ -86,7 +90,7 @@ pub(super) fn line_angle(mode: &ModeLaw<'_>) -> Option<f64> {
     lines.find_map(|feature| feature.setpoint)
 }
 
-/// The longest line among the objects of a simulated bench.
+/// A line among the objects of a simulated bench.
 struct Line<'a> {
     shape: &'a str,
     /// Its length and that of the pad [m].
@@ -107,25 +111,27 @@ impl fmt::Display for Line<'_> {
     }
 }
 
-/// Returns the longest line that a simulated bench states, on a pad that measures a place.
-fn stated<'a>(arm: &Controlled<'a>, mode: &ModeLaw<'_>, feature: &Feature) -> Option<Line<'a>> {
+/// Returns the shortest line that a simulated bench states, on a pad that measures a place: any of them may be touched.
+fn shortest_line<'a>(arm: &Controlled<'a>, mode: &ModeLaw<'_>, feature: &Feature) -> Option<Line<'a>> {
     let [from, to] = mode.range(feature)?;
-    let objects = arm.outline.devices.iter().flat_map(|device| &device.settings);
-    let objects = objects.filter(|setting| setting.path == "objects").filter_map(|setting| match &setting.value.item {
-        Item::Array(objects) => Some(objects),
-        _ => None,
-    });
-    let lines = objects.flatten().filter_map(|object| line(object.as_table()?));
-    let (shape, length) = lines.max_by(|(_, one), (_, other)| one.total_cmp(other))?;
+    let lines = arm.objects().filter_map(line);
+    let (shape, length) = lines.min_by(|(_, one), (_, other)| one.total_cmp(other))?;
     Some(Line { shape, length, pad: to - from })
 }
 
-/// Returns the shape and the length [m] of an object whose print is a line or the face of a box.
+/// Returns the shape and the length [m] of an object whose print is a line or the face of a box, as far as it lies in the
+/// plane of the pad.
 fn line(object: &Table) -> Option<(&str, f64)> {
     let shape = object.get("shape")?.as_str()?;
+    let turn = object.get("turn").and_then(Value::read).unwrap_or_default();
+    let rotation = pose_of([0.0; 3], turn).rotation;
+    let lies = |axis: usize| (rotation * Vector3::ith(axis, 1.0)).z.abs() < LYING;
     let length = match shape {
-        "pen" => object.get("length")?.read()?,
-        "box" => object.get("size")?.read::<[f64; 3]>()?.into_iter().fold(0.0, f64::max),
+        "pen" => object.get("length")?.read().filter(|_| lies(1))?,
+        "box" => {
+            let size: [f64; 3] = object.get("size")?.read()?;
+            (0..3).filter(|axis| lies(*axis)).map(|axis| size[axis]).fold(0.0, f64::max)
+        }
         "cable" => {
             let points: Vec<[f64; 3]> = object.get("points")?.read()?;
             let steps = points.windows(2).map(|pair| (0..3).map(|i| (pair[1][i] - pair[0][i]).powi(2)).sum::<f64>());

@@ -22,7 +22,7 @@ use std::collections::BTreeSet;
 use std::ops::Range;
 
 use tactflow_runtime::graph::{NO_SPAN, Outline, OutlinedMode};
-use tactflow_runtime::source::{Code, Diagnostics};
+use tactflow_runtime::source::{Code, Diagnostics, Item, Table, Value};
 
 use super::control::chain::{Limiter, chain};
 use super::control::collect::law;
@@ -125,7 +125,18 @@ fn controlled<'a>(
     Some(Controlled { outline, task, limits, twist, contacts, modes })
 }
 
-impl Controlled<'_> {
+impl<'a> Controlled<'a> {
+    /// Returns the objects of a simulated bench.
+    fn objects(&self) -> impl Iterator<Item = &'a Table> {
+        let settings = self.outline.devices.iter().flat_map(|device| &device.settings);
+        let objects = settings.filter(|setting| setting.path == "objects");
+        let objects = objects.filter_map(|setting| match &setting.value.item {
+            Item::Array(objects) => Some(objects),
+            _ => None,
+        });
+        objects.flatten().filter_map(Value::as_table)
+    }
+
     /// Returns whether a feature has a gain in any mode.
     fn has_gain(&self, feature: &Feature) -> bool {
         let mut features = self.modes.iter().flat_map(|mode| &mode.law.features);

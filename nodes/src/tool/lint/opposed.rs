@@ -1,6 +1,6 @@
 //! Motions that work against each other in one mode, and motions into an object that is already pressed.
 
-use tactflow_runtime::source::{Code, Diagnostic, Diagnostics};
+use tactflow_runtime::source::{Code, Diagnostic, Diagnostics, Item, Table};
 
 use super::exits::Exit;
 use super::modes::GUIDES;
@@ -12,7 +12,8 @@ use crate::tool::control::settings::source;
 pub(super) fn check(arm: &Controlled<'_>, found: &mut Diagnostics) {
     for mode in &arm.modes {
         let contradiction = retreat(mode).or_else(|| held(mode)).or_else(|| push(arm, mode));
-        found.extend(contradiction.or_else(|| pressed(mode)).or_else(|| contended(mode)));
+        found
+            .extend(contradiction.or_else(|| pressed(mode)).or_else(|| dragged(arm, mode)).or_else(|| contended(mode)));
     }
 }
 
@@ -73,8 +74,9 @@ fn holds(mode: &ModeLaw<'_>, guide: &Guidance) -> Option<[bool; 6]> {
     let node = mode.nodes.node(guide.node())?;
     let moves = |key: &str| mode.nodes.number(node, key).is_some_and(|speed| speed > 0.0);
     let (linear, angular) = (moves("speed_m_per_s"), moves("speed_rad_per_s"));
+    let is_open = |gate: &str| gate.ends_with(".present") || mode.nodes.is_set(gate) == Some(true);
     match guide.kind.as_str() {
-        "hold_pose" if source(node, "gate").is_none_or(|gate| gate.ends_with(".present")) => {
+        "hold_pose" if source(node, "gate").is_none_or(is_open) => {
             Some(std::array::from_fn(|i| if i < 3 { linear } else { angular }))
         }
         "follow_path" => {
@@ -117,12 +119,13 @@ const SHIFTED: f64 = 0.2;
 /// Returns the warning about a constant motion into the object beside the control of a force: without an integral, the
 /// force rests above its setpoint, where the controller moves back as fast.
 fn pressed(mode: &ModeLaw<'_>) -> Option<Diagnostic> {
-    // An approach ends with the contact by which the force is measured.
-    if mode.waits_for_contact() {
+    // An approach ends with the contact by which the force is measured, or with the force.
+    if mode.waits_for_contact() || mode.watches() {
         return None;
     }
-    let speed: f64 = mode.law.constants.iter().map(|constant| constant.twist[2]).sum();
-    let constant = mode.law.constants.iter().find(|constant| constant.is_free && constant.twist[2] > 0.0)?;
+    let free = || mode.law.constants.iter().filter(|constant| constant.is_free);
+    let speed: f64 = free().map(|constant| constant.twist[2]).sum();
+    let constant = free().find(|constant| constant.twist[2] > 0.0)?;
     let shift = |feature: &Feature| speed / (feature.kp * feature.column[2]);
     let is_shifted = |feature: &&Feature| {
         let is_force = matches!(mode.quantity(feature), Some("pressure" | "force"));
@@ -130,6 +133,7 @@ fn pressed(mode: &ModeLaw<'_>) -> Option<Diagnostic> {
         let is_left = feature.ki == 0.0 || within.is_some_and(|within| within < shift(feature));
         is_force
             && is_left
+            && feature.kp > 0.0
             && feature.is_free(&mode.nodes)
             && feature.schedules.is_empty()
             && feature.column[2] > 0.0
@@ -148,8 +152,48 @@ fn pressed(mode: &ModeLaw<'_>) -> Option<Diagnostic> {
     Some(Diagnostic::new(Code::OpposedMotion, mode.place(&constant.node, "twist"), message).help(&*help))
 }
 
-/// Returns the warning about two forces whose integrals move the same component alone: each moves until its own setpoint
-/// is reached, and both are not reached together.
+/// Distance from its setpoint at which a constant motion may hold a contact [m].
+const BESIDE: f64 = 0.001;
+
+/// Returns the warning about a constant motion along a component in which a feature holds the place of an object that does
+/// not move: the contact rests beside the setpoint, where the controller moves back as fast.
+fn dragged(arm: &Controlled<'_>, mode: &ModeLaw<'_>) -> Option<Diagnostic> {
+    let is_still = |object: &Table| {
+        object.get("motion").is_none_or(|motion| matches!(&motion.item, Item::Array(steps) if steps.is_empty()))
+    };
+    // A motion beside the control follows an object that moves.
+    if arm.objects().next().is_none() || !arm.objects().all(is_still) {
+        return None;
+    }
+    let constants = mode.law.constants.iter().filter(|constant| constant.is_free);
+    let (constant, feature, shift) =
+        constants.flat_map(|constant| [(constant, 0), (constant, 1)]).find_map(|(constant, i)| {
+            let shift = |feature: &Feature| (constant.twist[i] / (feature.kp * feature.column[i])).abs();
+            let is_shifted = |feature: &&Feature| {
+                feature.ki == 0.0
+                    && feature.kp > 0.0
+                    && feature.column[i] != 0.0
+                    && feature.is_free(&mode.nodes)
+                    && mode.quantity(feature) == Some(["x", "y"][i])
+                    && shift(feature) > BESIDE
+            };
+            let feature = mode.moving().find(is_shifted)?;
+            Some((constant, feature, shift(feature)))
+        })?;
+    let message = format!(
+        "{}`{}` moves the sensor along the object while `{}` holds its place: it rests {:.1} mm beside its setpoint",
+        mode.named(),
+        constant.node,
+        feature.name,
+        shift * 1e3
+    );
+    let help =
+        format!("move along the component that `{}` leaves free, or select 0 for it in the projector", feature.name);
+    Some(Diagnostic::new(Code::OpposedMotion, mode.place(&constant.node, "twist"), message).help(help))
+}
+
+/// Returns the warning about two forces whose integrals move the same component alone: both setpoints are not reached
+/// together, so the integrals grow against each other.
 fn contended(mode: &ModeLaw<'_>) -> Option<Diagnostic> {
     let is_free = |feature: &&Feature| {
         feature.ki > 0.0
@@ -158,16 +202,17 @@ fn contended(mode: &ModeLaw<'_>) -> Option<Diagnostic> {
             && matches!(mode.quantity(feature), Some("pressure" | "force"))
     };
     let all: Vec<&Feature> = mode.moving().filter(is_free).collect();
-    let [one, other] = all[..] else { return None };
-    let differs = one.measured != other.measured || one.setpoint != other.setpoint;
+    let differs = |one: &Feature, other: &Feature| one.measured != other.measured || one.setpoint != other.setpoint;
+    let pairs = all.windows(2).find(|pair| differs(pair[0], pair[1]));
+    let [one, other] = pairs? else { return None };
     let message = format!(
-        "{}the integrals of `{}` and `{}` both move `vz`, each until its own setpoint is reached: they never rest",
+        "{}the integrals of `{}` and `{}` both move `vz`, each toward its own setpoint: they wind up against each other",
         mode.named(),
         one.name,
         other.name
     );
     let help = "leave `ki` to one of them";
-    differs.then(|| Diagnostic::new(Code::OpposedMotion, mode.place_of_gain(other, "ki"), message).help(help))
+    Some(Diagnostic::new(Code::OpposedMotion, mode.place_of_gain(other, "ki"), message).help(help))
 }
 
 fn deselect(i: usize) -> String {

@@ -1,4 +1,4 @@
-//! Features that are never present where they are controlled: a gate keeps them away.
+//! Features that are never present where they are controlled: a gate keeps them away, or a wire is missing.
 
 use tactflow_runtime::graph::OutlinedBlock;
 use tactflow_runtime::source::{Code, Diagnostic, Diagnostics};
@@ -52,18 +52,14 @@ fn barred<'f>(arm: &Controlled<'_>, mode: &ModeLaw<'_>, feature: &'f Feature) ->
     })
 }
 
-/// Returns why a comparison never sets its flag: it needs a larger force than a limit allows, or than the mode asks for.
+/// Returns why a comparison never sets its flag: it needs a larger force than a limit allows.
 fn out_of_reach(arm: &Controlled<'_>, mode: &ModeLaw<'_>, flag: &str) -> Option<String> {
     let node = mode.nodes.writer(flag).filter(|node| node.kind.text == "compare")?;
     let above = mode.nodes.number(node, "above")?;
     let port = way(&mode.nodes, source(node, "value")?).measured;
     let quantity = mode.quantity_of(&port)?;
-    if let Some((limit, key)) = force_limit(arm, mode, quantity).filter(|(limit, _)| above >= *limit) {
-        return Some(format!("which is set above {above}, where the limit `{key}` is {limit}"));
-    }
-    let held = mode.moving().filter(|feature| mode.quantity(feature) == Some(quantity));
-    let (name, setpoint) = held.filter_map(|feature| Some((&feature.name, feature.setpoint?))).next()?;
-    (above > setpoint).then(|| format!("which is set above {above}, where the setpoint of `{name}` is {setpoint}"))
+    let (limit, key) = force_limit(arm, mode, quantity)?;
+    (above >= limit).then(|| format!("which is set above {above}, where the limit `{key}` is {limit}"))
 }
 
 /// Returns whether a flag is the opposite of a contact.

@@ -1,10 +1,13 @@
 //! What a mode asks for or waits for and never gets: it lies beyond a limit, below a threshold, beside a window, or within a
 //! deadband.
 
+use std::f64::consts::FRAC_PI_2;
+
 use tactflow_runtime::graph::OutlinedBlock;
-use tactflow_runtime::source::{Code, Diagnostic, Diagnostics};
+use tactflow_runtime::source::{Code, Diagnostic, Diagnostics, Value};
 
 use super::modes::upstream;
+use super::stability::rounded;
 use super::{Controlled, ModeLaw};
 use crate::tool::control::filters::way;
 use crate::tool::control::law::Feature;
@@ -13,19 +16,23 @@ use crate::tool::control::settings::source;
 pub(super) fn check(arm: &Controlled<'_>, found: &mut Diagnostics) {
     for mode in &arm.modes {
         found.extend(mode.moving().filter_map(|feature| setpoint(arm, mode, feature)));
-        found.extend(mode.moving().filter_map(|feature| asleep(mode, feature)));
+        found.extend(mode.moving().filter_map(|feature| always_resting(arm, mode, feature)));
         found.extend(mode.moving().filter_map(|feature| beside_window(mode, feature)));
-        found.extend(bounds(arm, mode));
+        found.extend(exit_bounds(arm, mode));
     }
     found.extend(arm.modes.first().into_iter().flat_map(|mode| thresholds(arm, mode)));
 }
 
 /// Returns the warnings about exits that wait for a larger force than a limit allows.
-fn bounds(arm: &Controlled<'_>, mode: &ModeLaw<'_>) -> Diagnostics {
+fn exit_bounds(arm: &Controlled<'_>, mode: &ModeLaw<'_>) -> Diagnostics {
     let exits = ["go", "done"].into_iter().flat_map(|kind| mode.tables(kind));
     let never = exits.filter_map(|exit| {
         let table = exit.as_table()?;
         let (when, above) = (table.get("when")?.as_str()?, table.get("above")?);
+        // Only something that pushes the pad gives more, and then the sensor is right to leave.
+        if table.get("to").and_then(Value::as_str).is_some_and(|to| leaves(arm, to)) {
+            return None;
+        }
         let quantity = watched(arm, mode, when)?;
         let (limit, key) = force_limit(arm, mode, &quantity)?;
         let bound = above.read::<f64>().filter(|bound| *bound >= limit)?;
@@ -112,25 +119,38 @@ pub(super) fn setpoint(arm: &Controlled<'_>, mode: &ModeLaw<'_>, feature: &Featu
     Some(Diagnostic::new(Code::UnreachableSetpoint, mode.place(node, &format!("setpoint.{name}")), message).help(help))
 }
 
-/// Returns the warning about a deadband in which a feature rests whatever it measures.
-fn asleep(mode: &ModeLaw<'_>, feature: &Feature) -> Option<Diagnostic> {
+/// Returns the warning about a deadband in which a feature rests whatever it measures, or without a contact.
+fn always_resting(arm: &Controlled<'_>, mode: &ModeLaw<'_>, feature: &Feature) -> Option<Diagnostic> {
     let band = deadband(mode, feature)?;
     let (name, path) = (&feature.name, format!("width.{}.outer", feature.name));
-    let (outer, setpoint) = (mode.nodes.number(band, &path)?, feature.setpoint?);
-    let (largest, why) = match mode.quantity(feature)? {
-        // The error of a contact that presses no more.
-        "pressure" | "force" if setpoint > 0.0 => {
-            (setpoint, "once it rests, it presses no more, whatever the object does")
+    let outer = mode.nodes.number(band, &path)?;
+    let largest = largest_error(arm, mode, feature);
+    let why = match mode.quantity(feature)? {
+        "pressure" | "force" => {
+            format!("without a contact its error is {largest}, so once it rests it presses no more")
         }
-        "x" | "y" => (mode.farthest(feature)?, "it rests wherever the contact is"),
-        _ => return None,
+        _ => format!("no error is larger than {largest}, so it rests wherever the contact is"),
     };
     if outer < largest {
         return None;
     }
-    let message = format!("`{name}` rests up to an error of {outer}, but none is larger than {largest}: {why}");
-    let help = format!("write an `outer` well below {largest}, for example {}", (1e5 * largest).round() / 1e6);
+    let message = format!("`{name}` rests up to an error of {outer}, but {why}");
+    let [inner, outer] = [0.05, 0.1].map(|share| rounded(share * largest, libm::floor));
+    let help = format!("write widths well below {largest}: `width.{name} = {{ inner = {inner}, outer = {outer} }}`");
     Some(Diagnostic::new(Code::UnreachableSetpoint, mode.place(&band.name, &path), message).help(help))
+}
+
+/// Returns the largest error that a feature can have, as far as it is known.
+pub(super) fn largest_error(arm: &Controlled<'_>, mode: &ModeLaw<'_>, feature: &Feature) -> f64 {
+    match mode.quantity(feature) {
+        Some("orientation") => FRAC_PI_2,
+        Some(quantity @ ("pressure" | "force")) => {
+            // At the first touch it is the setpoint.
+            let most = force_limit(arm, mode, quantity).map_or(f64::INFINITY, |(most, _)| most);
+            feature.setpoint.filter(|setpoint| *setpoint > 0.0).map_or(most, |setpoint| most.min(setpoint))
+        }
+        _ => mode.farthest(feature).unwrap_or(f64::INFINITY),
+    }
 }
 
 /// Returns the warning about a place outside of the window in which it is measured.
@@ -163,8 +183,12 @@ pub(super) fn deadband<'a>(mode: &ModeLaw<'a>, feature: &Feature) -> Option<&'a 
 
 /// Returns whether a mode is meant to end without a contact: an exit waits for that, or the sensor moves away after it.
 fn lets_go(arm: &Controlled<'_>, mode: &ModeLaw<'_>) -> bool {
-    let leaves = |name: &str| arm.modes.iter().any(|other| other.own_name() == name && other.approach() < 0.0);
-    mode.releases().next().is_some() || mode.lost().any(|exit| leaves(exit.to))
+    mode.releases().next().is_some() || mode.lost().any(|exit| leaves(arm, exit.to))
+}
+
+/// Returns whether the sensor moves away from the object in a mode.
+fn leaves(arm: &Controlled<'_>, mode: &str) -> bool {
+    arm.modes.iter().any(|other| other.own_name() == mode && other.backs_off())
 }
 
 /// Returns the smallest value of a tactel that a feature counts, and the node that drops smaller ones.

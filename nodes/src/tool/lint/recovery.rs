@@ -24,6 +24,13 @@ impl ModeLaw<'_> {
         constant + composed.filter_map(|guide| self.generated(guide)).sum::<f64>()
     }
 
+    /// Returns whether the mode moves the sensor away from the object.
+    pub(super) fn backs_off(&self) -> bool {
+        let lifts =
+            |guide: &Guidance| matches!(&*guide.kind, "park" | "hold_pose") && guide.passes[2] && !self.rests(guide);
+        self.approach() < 0.0 || self.law.guidance.iter().any(lifts)
+    }
+
     /// Returns the speed with which the mode searches [m/s]: toward the object, or half of that along it.
     fn search_speed(&self) -> f64 {
         let along = |i: usize| self.law.constants.iter().map(|constant| constant.twist[i]).sum::<f64>();
@@ -50,7 +57,7 @@ pub(super) fn check(arm: &Controlled<'_>, found: &mut Diagnostics) {
         found.extend(mode.lost().filter(|exit| !first.contains(exit.to)).filter_map(|exit| {
             let search = search(arm, exit.to, &first);
             // A task that backs off first approaches again from a distance.
-            let backs_off = search.iter().filter_map(|name| named(arm, name)).any(|mode| mode.approach() < 0.0);
+            let backs_off = search.iter().filter_map(|name| named(arm, name)).any(ModeLaw::backs_off);
             let (fast, again) = fastest(arm, &search, |mode| mode.search_speed()).filter(|_| !backs_off)?;
             let is_beside = named(arm, fast)?.approach() < again;
             (again > first_speed * (1.0 + 1e-9)).then(|| report(&exit, (fast, again, is_beside), (slow, first_speed)))

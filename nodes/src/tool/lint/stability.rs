@@ -103,10 +103,9 @@ fn judge(mode: &ModeLaw<'_>, feature: &Feature, contacts: &[Contact]) -> Option<
     let low = worst(&|found| !KEPT.holds(&found.margins));
     let slow = worst(&|found| is_slow(&found.margins, found.lag)).filter(|_| low.is_none() || feature.delay() > SLOW);
     match (slow, low) {
-        (Some(slow), low) => {
-            slow_filter(mode, feature, contacts, slow).or_else(|| low.map(|low| low_margin(mode, feature, &loops, low)))
-        }
-        (_, Some(low)) => Some(low_margin(mode, feature, &loops, low)),
+        (Some(slow), low) => slow_filter(mode, feature, contacts, slow)
+            .or_else(|| low.map(|low| low_margin(mode, feature, (contacts, &loops), low))),
+        (_, Some(low)) => Some(low_margin(mode, feature, (contacts, &loops), low)),
         _ => None,
     }
 }
@@ -137,7 +136,12 @@ fn figures(margins: &Margins) -> String {
     }
 }
 
-fn low_margin(mode: &ModeLaw<'_>, feature: &Feature, loops: &[(&Contact, Loop)], low: &Found<'_>) -> Diagnostic {
+fn low_margin(
+    mode: &ModeLaw<'_>,
+    feature: &Feature,
+    (contacts, loops): (&[Contact], &[(&Contact, Loop)]),
+    low: &Found<'_>,
+) -> Diagnostic {
     let (name, place) = (&feature.name, mode.place_of_gain(feature, "kp"));
     let message = match low.margins.is_stable {
         true => format!("the loop of `{name}` is near instability {}: {}", over(low.object), figures(&low.margins)),
@@ -151,7 +155,7 @@ fn low_margin(mode: &ModeLaw<'_>, feature: &Feature, loops: &[(&Contact, Loop)],
         ),
         None => diagnostic,
     };
-    let diagnostic = feature.beside.iter().fold(diagnostic, |diagnostic, other| {
+    let diagnostic = feature.added(contacts).fold(diagnostic, |diagnostic, other| {
         let why = if other.measured == feature.measured { "answer the same measurement" } else { "move `vz`" };
         let note = format!("the loop of `{}` adds to it: both {why}", other.name);
         diagnostic.note(mode.place_of_gain(other, "kp"), note)
@@ -181,8 +185,12 @@ fn low_margin(mode: &ModeLaw<'_>, feature: &Feature, loops: &[(&Contact, Loop)],
 
 /// Returns the place of a derivative gain that alone takes the margins of all loops, and what stands there without it.
 fn undamped(mode: &ModeLaw<'_>, feature: &Feature, loops: &[Loop]) -> Option<(Range<usize>, String)> {
-    let is_good = feature.kd > 0.0 && loops.iter().all(|around| KEPT.holds(&margins(&around.without_derivative())));
-    is_good.then(|| (mode.place_of_gain(feature, "kd"), "0.0".to_owned()))
+    let period = mode.nodes.period();
+    let is_good = |around: &Loop| {
+        let found = margins(&around.without_derivative());
+        KEPT.holds(&found) && !is_slow(&found, found.crossover_hz.map_or(0.0, |hz| lag(feature, hz, period)))
+    };
+    (feature.kd > 0.0 && loops.iter().all(is_good)).then(|| (mode.place_of_gain(feature, "kd"), "0.0".to_owned()))
 }
 
 /// Returns the largest factor on the gains, up to a first one, with which the filters are quick enough for each loop.
@@ -207,7 +215,7 @@ fn rounded_down(number: f64) -> f64 {
 }
 
 /// Returns a number with two digits.
-fn rounded(number: f64, round: impl Fn(f64) -> f64) -> f64 {
+pub(super) fn rounded(number: f64, round: impl Fn(f64) -> f64) -> f64 {
     let digits = 1.0 - libm::floor(libm::log10(number.abs()));
     let scale = libm::pow(10.0, digits);
     let exact = round(number * scale) / scale;

@@ -50,10 +50,9 @@ pub(super) fn cases(args: &TuneArgs, request: &Request, shell: &Shell) -> Result
         let arm = arm_of(outline).unwrap_or_default();
         let stated = Stated { file: bench_file(outline), contacts: contacts(compiled.facts(), arm)? };
         let stem = stated.file.as_ref().and_then(|file| file.file_stem());
-        let object = match &stated.contacts[..] {
-            [only] => Some(only.object.clone()),
-            _ => stem.map(|stem| stem.to_string_lossy().into_owned()),
-        };
+        // Those with a setting are of the same object.
+        let first = stated.contacts.first().map(|contact| contact.object.clone());
+        let object = first.or_else(|| stem.map(|stem| stem.to_string_lossy().into_owned()));
         let with = also.map_or_else(String::new, |set| format!(" with {set}"));
         let outline = outline.clone();
         Ok(Case { request, outline, stated, object: object.unwrap_or_else(|| "object".into()) + &with })

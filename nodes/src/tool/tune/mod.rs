@@ -167,10 +167,11 @@ impl Tuned {
     fn stated(&self) -> Vec<Stated> {
         let mut benches: Vec<Stated> = Vec::new();
         for (bench, measured) in self.benches.iter().zip(&self.contacts).filter(|(_, it)| !it.features.is_empty()) {
-            if benches.last().is_none_or(|last| last.file != bench.file) {
+            if benches.iter().all(|known| known.file != bench.file) {
                 benches.push(bench.clone());
             }
-            let Some(Stated { contacts, .. }) = benches.last_mut() else { continue };
+            let known = benches.iter_mut().find(|known| known.file == bench.file);
+            let Some(Stated { contacts, .. }) = known else { continue };
             match contacts.iter_mut().find(|contact| contact.object == measured.object) {
                 Some(contact) => contact.features.extend(measured.features.clone()),
                 None => contacts.push(measured.clone()),
@@ -245,7 +246,8 @@ fn tune(args: &TuneArgs, shell: &Shell, request: &Request, outline: &Outline) ->
     let mut contacts: Vec<Contact> = cases.iter().map(Case::contact).collect();
     let mut features = Vec::new();
     for feature in &controlled {
-        let mut measure = |share: f64| -> Result<TunedFeature, Stop> {
+        let measure = |share: f64| -> Result<(TunedFeature, Vec<Contact>), Stop> {
+            let mut contacts = contacts.clone();
             let found = cases.iter().zip(&mut contacts).map(|(case, contact)| {
                 let (catalogue, component, period) = (shell.catalogue(), 0, outline.period_s);
                 let (request, adder) = (&case.request, &*adder);
@@ -259,22 +261,24 @@ fn tune(args: &TuneArgs, shell: &Shell, request: &Request, outline: &Outline) ->
                 Ok(found)
             });
             let found = found.collect::<Result<Vec<Found>, Stop>>()?;
-            Ok(propose(feature.clone(), found, &contacts, wanted, outline.period_s))
+            Ok((propose(feature.clone(), found, &contacts, wanted, outline.period_s), contacts))
         };
         let say = |gains: &str| shell.say_beside(&format!("`{}`: again, with {gains}", feature.name));
         let mut found = measure(HALF)?;
-        if found.answers.iter().any(|found| found.is_lost) {
+        if found.0.answers.iter().any(|found| found.is_lost) {
             // A loop that hardly holds the contact loses it with a test signal.
             say("an eighth of its gains");
             found = measure(HALF * QUARTER)?;
         }
         // A stiff loop holds the contact against the test signal, and friction then hides more of the motion. A soft one
         // has not settled when the signal begins.
-        if let Some(factor) = found.factor().filter(|factor| !NEAR.contains(factor)) {
+        if let Some(factor) = found.0.factor().filter(|factor| !NEAR.contains(factor)) {
             say("a quarter of the gains that were found");
             let again = measure(QUARTER * factor)?;
-            found = if again.new.is_some() { again } else { found };
+            found = if again.0.new.is_some() { again } else { found };
         }
+        let (found, answered) = found;
+        contacts = answered;
         features.push(found);
     }
     let arm = arm_of(outline).unwrap_or_default().to_owned();
@@ -342,11 +346,7 @@ fn identify(experiment: &Experiment<'_>, object: &str, period: f64, shell: &Shel
                 found.growth = growth.or(found.growth);
             }
             Err(why) => {
-                let lighter = match Answer::of_geometry(&quantity(feature)) {
-                    Some(_) if !is_lost => "; a lighter press has less friction",
-                    _ => "",
-                };
-                (found.refused, found.is_lost) = (Some(why + lighter), is_lost);
+                (found.refused, found.is_lost) = (Some(why), is_lost);
                 break;
             }
         }

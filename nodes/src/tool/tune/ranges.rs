@@ -5,6 +5,8 @@ use toml_edit::{InlineTable, Value};
 
 use super::TunedFeature;
 
+/// Ends of the names of the gains that are tuned.
+const GAINS: [&str; 3] = [".kp", ".ki", ".kd"];
 /// Largest gain that is tried [1/s].
 const LARGEST: f64 = 1e6;
 
@@ -22,7 +24,9 @@ impl Range {
     /// Returns the ranges of all gains of the graph itself; those of its parts stay as they are.
     pub(super) fn all(engine: &Engine) -> Vec<Self> {
         let params = engine.live_values().map(|value| value.param);
-        let gains = params.filter(|param| param.name.split('.').nth(1) == Some("gains"));
+        let is_gain =
+            |name: &str| name.split('.').nth(1) == Some("gains") && GAINS.iter().any(|gain| name.ends_with(gain));
+        let gains = params.filter(|param| is_gain(&param.name));
         gains.map(|it| Self { name: it.name.clone(), min: it.min, max: it.max, rate: it.rate }).collect()
     }
 

@@ -55,20 +55,19 @@ pub(super) fn agreed(experiment: &Experiment<'_>, shell: &Shell) -> Result<Resul
     }
     if let [.., before, last] = &runs[..] {
         let growth = loudness(before, last);
-        let is_close = match growth > 1.0 {
-            true => growth <= 1.0 + MAX_CHANGE && shared(before, last) >= ENOUGH,
-            false => difference(before, last) <= MAX_CHANGE,
-        };
-        if is_close {
+        if growth <= 1.0 + MAX_CHANGE && difference(before, last) <= MAX_CHANGE {
             let lines = if growth > 1.0 { last } else { before }.clone();
             return Ok(Ok(Response { lines, growth: Some(growth) }));
         }
     }
     let is_lost = agree.is_none() && stopped.is_some();
+    let lighter = if experiment.component < 2 { "; a lighter press has less friction" } else { "" };
     let why = match agree {
-        Some(_) => "friction holds the contact back: only the largest test signal moves it".into(),
+        Some(_) => format!("friction holds the contact back: only the largest test signal moves it{lighter}"),
         None => stopped.unwrap_or_else(|| {
-            format!("no two test signals gave the same response at {ENOUGH} frequencies that stand out of the noise")
+            format!(
+                "no two test signals gave the same response at {ENOUGH} frequencies that stand out of the noise{lighter}"
+            )
         }),
     };
     Ok(Err(Refusal { why, is_lost }))
