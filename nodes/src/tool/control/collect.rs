@@ -177,10 +177,12 @@ fn switch<'a>(nodes: &Nodes<'a>, node: &'a OutlinedBlock, passage: &Passage, law
 /// Returns the constant motion of a node; `None` if it is zero, or if its gate is closed in this mode.
 fn constant(nodes: &Nodes<'_>, node: &OutlinedBlock, passage: &Passage) -> Option<Constant> {
     let twist = passage.of(nodes.value(node, "twist").and_then(|twist| twist.value.read()).unwrap_or_default());
-    let open = source(node, "gate").map_or(Some(true), |gate| nodes.is_set(gate));
+    let gate = source(node, "gate");
+    let open = gate.map_or(Some(true), |gate| nodes.is_set(gate));
     if open == Some(false) {
         return None;
     }
     let is_free = passage.is_free(nodes) && open == Some(true);
-    twist.iter().any(|part| *part != 0.0).then(|| Constant { node: node.name.clone(), twist, is_free })
+    let in_contact = is_free || passage.is_free(nodes) && gate.is_some_and(|gate| gate.ends_with(".present"));
+    twist.iter().any(|part| *part != 0.0).then(|| Constant { node: node.name.clone(), twist, is_free, in_contact })
 }

@@ -69,6 +69,9 @@ pub(crate) struct Constant {
     /// Whether no gate or switch stands in its way that may be closed.
     #[serde(skip)]
     pub(crate) is_free: bool,
+    /// The same during a contact.
+    #[serde(skip)]
+    pub(crate) in_contact: bool,
 }
 
 /// A node that moves the arm by a law of its own.

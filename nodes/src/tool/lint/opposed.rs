@@ -123,7 +123,7 @@ fn pressed(mode: &ModeLaw<'_>) -> Option<Diagnostic> {
     if mode.waits_for_contact() || mode.watches() {
         return None;
     }
-    let free = || mode.law.constants.iter().filter(|constant| constant.is_free);
+    let free = || mode.law.constants.iter().filter(|constant| constant.in_contact);
     let speed: f64 = free().map(|constant| constant.twist[2]).sum();
     let constant = free().find(|constant| constant.twist[2] > 0.0)?;
     let shift = |feature: &Feature| speed / (feature.kp * feature.column[2]);
@@ -165,7 +165,7 @@ fn dragged(arm: &Controlled<'_>, mode: &ModeLaw<'_>) -> Option<Diagnostic> {
     if arm.objects().next().is_none() || !arm.objects().all(is_still) {
         return None;
     }
-    let constants = mode.law.constants.iter().filter(|constant| constant.is_free);
+    let constants = mode.law.constants.iter().filter(|constant| constant.in_contact);
     let (constant, feature, shift) =
         constants.flat_map(|constant| [(constant, 0), (constant, 1)]).find_map(|(constant, i)| {
             let shift = |feature: &Feature| (constant.twist[i] / (feature.kp * feature.column[i])).abs();
