@@ -13,7 +13,9 @@ use tactflow_runtime::source::{Diagnostic, Report};
 use tactflow_tests::{catalogue, toml_files, workspace};
 
 use good::{good, good_at_second_sight, good_behind_nodes, good_by_modes, good_by_turns};
-use poor::{never_reached, opposed, poor_behind_nodes, poor_gains, poor_modes, poor_sums, wrong_columns};
+use poor::{
+    more_wrong_columns, never_reached, opposed, poor_behind_nodes, poor_gains, poor_modes, poor_sums, wrong_columns,
+};
 use variant::{graph, variant};
 
 fn codes(report: Option<&Report>) -> BTreeSet<&'static str> {
@@ -29,8 +31,16 @@ fn fixed(report: &Report, fixed: &Diagnostic, graph: &Path) -> Option<String> {
 #[test]
 fn each_poor_controller_gets_its_warning_and_no_other() {
     let mut wrong = Vec::new();
-    let poor =
-        [wrong_columns(), poor_gains(), poor_modes(), poor_behind_nodes(), poor_sums(), opposed(), never_reached()];
+    let poor = [
+        wrong_columns(),
+        more_wrong_columns(),
+        poor_gains(),
+        poor_modes(),
+        poor_behind_nodes(),
+        poor_sums(),
+        opposed(),
+        never_reached(),
+    ];
     let poor: Vec<_> = poor.into_iter().flatten().collect();
     assert!(poor.len() > 50, "{}", poor.len());
     let kinds: BTreeSet<_> = poor.iter().map(|(code, _)| *code).collect();

@@ -71,6 +71,13 @@ pub(super) fn wrong_columns() -> Vec<(&'static str, Variant)> {
         variant("hybrid", &["columns.x = [0, -0.98, 0, 0, 0, 0]", "columns.y = [0.98, 0, 0, 0, 0, 0]"]),
         variant("rolling", &["columns.x = [-1, 0, 0, -20, 0, 0]"]),
         variant("hybrid", &["columns.pressure = [3, 0, 1, 0, 0, 0]"]),
+    ];
+    cases.into_iter().map(|variant| ("wrong-column", variant)).collect()
+}
+
+/// Columns that are wrong for lines, areas and drags, and behind a mount.
+pub(super) fn more_wrong_columns() -> Vec<(&'static str, Variant)> {
+    let cases = [
         // The offset of a line grows toward its direction turned by 90 degrees: here along -x.
         with_feature(
             "cable",
@@ -94,6 +101,19 @@ pub(super) fn wrong_columns() -> Vec<(&'static str, Variant)> {
         ),
         // A pad that is mounted half a turn about z.
         variant("hybrid", &HALF_TURN),
+        // Where the direction wraps, no column is right.
+        with_feature(
+            "edge",
+            "offset",
+            "line2.offset",
+            "[1, 0, 0, 0, 0, 0]",
+            &[
+                "set nodes.line2.type=\"hough\"",
+                "set nodes.line2.in.image=\"touch.repaired\"",
+                "set nodes.line2.in.region=\"touch.region\"",
+                "select = [1, 0, 1, 0, 0, 1]",
+            ],
+        ),
         with_feature("hold_without_slip", "fx", "shear.fx", "[0.01, 0, 0, 0, 0, 0]", &["select = [1, 0, 1, 0, 0, 0]"]),
         with_feature(
             "edge",

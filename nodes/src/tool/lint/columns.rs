@@ -136,10 +136,16 @@ fn offset(arm: &Controlled<'_>, mode: &ModeLaw<'_>, feature: &Feature) -> Option
     if mode.quantity(feature)? != "offset" || is_stated {
         return None;
     }
-    // Where the direction wraps from pi/2 to -pi/2, the offset changes its sign.
     let angle = wrap_axial(line_angle(mode)?);
     if angle.abs() > FRAC_PI_2 - ALONG {
-        return None;
+        let message = format!(
+            "`{}` changes its sign where the direction of the line wraps from pi/2 to -pi/2, near the {angle} rad at which the \
+             line is held: no column is right on both sides",
+            feature.name
+        );
+        let help =
+            "hold the line along x, with a setpoint of 0 rad, or measure its place with `moments` or `curvature`";
+        return Some(Diagnostic::new(Code::WrongColumn, mode.place_of_column(feature), message).help(help));
     }
     let (across_x, across_y) = (libm::sin(angle), -libm::cos(angle));
     let column = mode.column(feature)?;
@@ -147,7 +153,8 @@ fn offset(arm: &Controlled<'_>, mode: &ModeLaw<'_>, feature: &Feature) -> Option
         return None;
     }
     let message = format!(
-        "the column of `{}` increases its error: the offset of a line at {angle} rad grows when the sensor moves along ({:.2}, {:.2})",
+        "the column of `{}` increases its error: the offset of a line at {angle} rad grows when the sensor moves along \
+         ({:.2}, {:.2})",
         feature.name, across_x, across_y
     );
     let mut right = column;

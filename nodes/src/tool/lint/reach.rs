@@ -36,7 +36,11 @@ fn exit_bounds(arm: &Controlled<'_>, mode: &ModeLaw<'_>) -> Diagnostics {
         let quantity = watched(arm, mode, when)?;
         let (limit, key) = force_limit(arm, mode, &quantity)?;
         let bound = above.read::<f64>().filter(|bound| *bound >= limit)?;
-        let message = format!("an exit of mode `{}` waits for `{when}` above {bound}, but the limit `{key}` is {limit}: it is never taken", mode.own_name());
+        let message = format!(
+            "an exit of mode `{}` waits for `{when}` above {bound}, but the limit `{key}` is {limit}: the sensor never presses \
+             that hard",
+            mode.own_name()
+        );
         let help = format!("write a bound well below {limit}, or raise `{key}` in [limits]");
         Some(Diagnostic::new(Code::UnreachableSetpoint, above.span.clone(), message).help(help))
     });
