@@ -25,6 +25,9 @@ struct Passage {
     delays: Vec<Filter>,
 }
 
+/// Part of a motion along another component that is none [1].
+const REST: f64 = 1e-4;
+
 impl Default for Passage {
     fn default() -> Self {
         Self { matrix: Matrix6::identity(), turned: None, gates: Vec::new(), sides: Vec::new(), delays: Vec::new() }
@@ -34,9 +37,10 @@ impl Default for Passage {
 impl Passage {
     /// Returns what becomes of a twist.
     fn of(&self, twist: [f64; 6]) -> [f64; 6] {
-        // Half a turn leaves no digits behind.
-        let clean = |part: f64| if part.abs() < 1e-12 { 0.0 } else { part };
-        (self.matrix * Vector6::from(twist)).map(clean).into()
+        let moved: [f64; 6] = (self.matrix * Vector6::from(twist)).into();
+        // A turn that is written with a few digits leaves a rest in the other components.
+        let most = [0, 3].map(|first| moved[first..first + 3].iter().fold(0.0_f64, |most, part| most.max(part.abs())));
+        std::array::from_fn(|i| if moved[i].abs() < REST * most[i / 3] { 0.0 } else { moved[i] })
     }
 
     /// Returns the way before a node that passes these components.
@@ -54,7 +58,7 @@ impl Passage {
 
     /// Returns the components of the arm that a node behind it can move.
     fn moves(&self) -> [bool; 6] {
-        std::array::from_fn(|i| self.matrix.row(i).iter().any(|entry| entry.abs() > 1e-12))
+        std::array::from_fn(|i| self.matrix.row(i).iter().any(|entry| entry.abs() > REST))
     }
 
     /// Returns the way before a gate.
@@ -156,9 +160,15 @@ fn collect<'a>(nodes: &Nodes<'a>, port: &str, passage: &Passage, law: &mut Law, 
     path.pop();
 }
 
-/// Returns the pose of an `adjoint`, if it does not change.
+/// Returns the pose of an `adjoint`, if it does not change and leaves the frame what it is: the pad is mounted otherwise
+/// than the columns say. Into another frame, the columns stay those of the frame in which they are written.
 fn still_pose(nodes: &Nodes<'_>, node: &OutlinedBlock) -> Option<Pose> {
     let adjoint = Some(node).filter(|node| node.kind.text == "adjoint")?;
+    let twist = source(adjoint, "twist")?;
+    let before = nodes.writer(twist)?.outputs.iter().find(|port| port.name == twist)?;
+    if before.frames != adjoint.outputs.first()?.frames {
+        return None;
+    }
     let pose = nodes.writer(source(adjoint, "pose")?).filter(|node| node.kind.text == "static_pose")?;
     let read = |key: &str| nodes.value(pose, key).map_or(Some([0.0; 3]), |value| value.value.read());
     Some(Pose(pose_of(read("xyz")?, read("rpy")?)))

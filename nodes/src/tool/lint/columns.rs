@@ -6,7 +6,7 @@ use std::f64::consts::FRAC_PI_2;
 use tactflow_runtime::graph::OutlinedBlock;
 use tactflow_runtime::source::{Code, Diagnostic, Diagnostics, Edit, Item};
 
-use super::lines::{ALONG, line_angle, line_axis};
+use super::lines::{line_angle, line_axis};
 use super::rows::{Answer, Row};
 use super::{Controlled, ModeLaw};
 use crate::motion::COMPONENTS;
@@ -32,10 +32,7 @@ fn wrong(arm: &Controlled<'_>, mode: &ModeLaw<'_>, feature: &Feature) -> Option<
     let Some((quantity, row)) = mode.quantity(feature).and_then(|quantity| Some((quantity, Row::of(quantity)?))) else {
         return reversed(arm, mode, feature).or_else(|| offset(arm, mode, feature));
     };
-    if let Some(turner) = &feature.turned {
-        return turned(mode, feature, quantity, row, turner);
-    }
-    let column = mode.column(feature)?;
+    let column = written(mode, feature)?;
     if !row.changes(&column) {
         return if row.is_needed { foreign(mode, feature, quantity, column) } else { reversed(arm, mode, feature) };
     }
@@ -59,29 +56,21 @@ fn wrong(arm: &Controlled<'_>, mode: &ModeLaw<'_>, feature: &Feature) -> Option<
     let right = row.signed(column);
     let message = format!(
         "the column of `{}` increases its error: `{name}` is {}, but {}",
-        feature.name, column[first.component], first.reason
+        feature.name,
+        three_digits(column[first.component]),
+        first.reason
     );
     Some(replaced(mode, feature, message, right))
 }
 
-/// Returns the warning about a column that is right in the frame in which it is written, and wrong behind the adjoint of a
-/// pose.
-fn turned(mode: &ModeLaw<'_>, feature: &Feature, quantity: &str, row: Row, turner: &str) -> Option<Diagnostic> {
-    let is_wrong = |answer: &Answer| feature.column[answer.component] * answer.sign < 0.0;
-    let aside = pairs(quantity).iter().any(|[own, other]| feature.column[*other].abs() > feature.column[*own].abs());
-    if !row.known.iter().any(is_wrong) && !aside && (row.changes(&feature.column) || !row.is_needed) {
-        return None;
-    }
-    let name = &feature.name;
-    let message = format!(
-        "behind `{turner}`, the column of `{name}` is {}, which does not reduce its error",
-        array(&feature.column.map(three_digits))
-    );
-    let help = format!(
-        "write the column in the frame before `{turner}`, or check its pose: `{name}` answers to {}",
-        row.components(" and ")
-    );
-    Some(Diagnostic::new(Code::WrongColumn, mode.place_of_column(feature), message).help(help))
+/// Returns the column of a feature before all projectors, as it is behind a mount that turns it.
+fn written(mode: &ModeLaw<'_>, feature: &Feature) -> Option<[f64; 6]> {
+    if feature.turned.is_some() { Some(feature.column) } else { mode.column(feature) }
+}
+
+/// Returns the start of a message about a column that a mount turns.
+fn behind(feature: &Feature) -> String {
+    feature.turned.as_ref().map(|turner| format!("behind `{turner}`, ")).unwrap_or_default()
 }
 
 /// Returns the components that change a quantity, each with one that changes another quantity.
@@ -124,6 +113,9 @@ fn aside(
     Some(replaced(mode, feature, message, right))
 }
 
+/// Angle from the wrap of a direction within which noise takes it to the other side [rad].
+const WRAP: f64 = 0.2;
+
 /// Returns a number with three digits.
 fn three_digits(number: f64) -> f64 {
     format!("{number:.2e}").parse().unwrap_or(number)
@@ -136,11 +128,13 @@ fn offset(arm: &Controlled<'_>, mode: &ModeLaw<'_>, feature: &Feature) -> Option
     if mode.quantity(feature)? != "offset" || is_stated {
         return None;
     }
-    let angle = wrap_axial(line_angle(mode)?);
-    if angle.abs() > FRAC_PI_2 - ALONG {
+    let setpoint = line_angle(mode)?;
+    let angle = wrap_axial(setpoint);
+    let moves = feature.column[0] != 0.0 || feature.column[1] != 0.0;
+    if moves && angle.abs() > FRAC_PI_2 - WRAP {
         let message = format!(
-            "`{}` changes its sign where the direction of the line wraps from pi/2 to -pi/2, near the {angle} rad at which the \
-             line is held: no column is right on both sides",
+            "`{}` changes its sign where the direction of the line wraps from pi/2 to -pi/2, near its setpoint of {setpoint} \
+             rad: no column is right on both sides",
             feature.name
         );
         let help =
@@ -148,7 +142,7 @@ fn offset(arm: &Controlled<'_>, mode: &ModeLaw<'_>, feature: &Feature) -> Option
         return Some(Diagnostic::new(Code::WrongColumn, mode.place_of_column(feature), message).help(help));
     }
     let (across_x, across_y) = (libm::sin(angle), -libm::cos(angle));
-    let column = mode.column(feature)?;
+    let column = written(mode, feature)?;
     if across_x * feature.column[0] + across_y * feature.column[1] >= 0.0 {
         return None;
     }
@@ -211,13 +205,14 @@ fn foreign(mode: &ModeLaw<'_>, feature: &Feature, quantity: &str, column: [f64; 
     let row = Row::of(quantity)?;
     // The feature whose column changes this one, and that this column changes.
     let other = mode.law.features.iter().find_map(|other| {
-        let other_column = mode.column(other)?;
+        let other_column = written(mode, other)?;
         let other_row = Row::of(mode.quantity(other)?)?;
         let is_exchanged =
             row.changes(&other_column) && other_row.changes(&column) && !other_row.changes(&other_column);
         is_exchanged.then_some((other, other_column))
     });
-    if let Some((other, other_column)) = other {
+    // Behind a mount, the columns that are written are others.
+    if let Some((other, other_column)) = other.filter(|_| feature.turned.is_none()) {
         let message = format!(
             "the columns of `{}` and `{}` are exchanged: {moved} does not change `{}`",
             feature.name, other.name, feature.name
@@ -245,14 +240,21 @@ fn foreign(mode: &ModeLaw<'_>, feature: &Feature, quantity: &str, column: [f64; 
         feature.name
     );
     let help = format!("`{quantity}` answers to {}: write the entry there", row.components(" and "));
-    Some(Diagnostic::new(Code::WrongColumn, mode.place_of_column(feature), message).help(help))
+    Some(Diagnostic::new(Code::WrongColumn, mode.place_of_column(feature), behind(feature) + &message).help(help))
 }
 
 /// Returns the warning about a column, with the right one as a fix.
 fn replaced(mode: &ModeLaw<'_>, feature: &Feature, message: String, right: [f64; 6]) -> Diagnostic {
-    let (place, right) = (mode.place_of_column(feature), array(&right));
-    let help = format!("write `columns.{} = {right}`", feature.name);
-    Diagnostic::new(Code::WrongColumn, place.clone(), message).help(help).edit(Edit::Replace(place, right))
+    let (place, right) = (mode.place_of_column(feature), array(&right.map(three_digits)));
+    let diagnostic = Diagnostic::new(Code::WrongColumn, place.clone(), behind(feature) + &message);
+    match &feature.turned {
+        Some(turner) => diagnostic.help(format!(
+            "behind `{turner}`, the column must be {right}: turn the column that is written, or check the pose"
+        )),
+        None => {
+            diagnostic.help(format!("write `columns.{} = {right}`", feature.name)).edit(Edit::Replace(place, right))
+        }
+    }
 }
 
 /// Writes a column as TOML.
@@ -273,7 +275,7 @@ fn projectors<'a>(nodes: &Nodes<'a>, port: &str) -> Vec<&'a OutlinedBlock> {
         "twist_switch" => nodes.sides(node).flat_map(|side| projectors(nodes, side)).collect(),
         // Not through a `twist_delay`, which can close a loop.
         "twist_gate" => all(&["value"]),
-        "pivot" => all(&["twist"]),
+        "pivot" | "adjoint" => all(&["twist"]),
         "projector" => [vec![node], all(&["twist"])].concat(),
         _ => Vec::new(),
     }

@@ -37,6 +37,11 @@ impl ModeLaw<'_> {
         self.exits("go").filter(Exit::is_lost)
     }
 
+    /// Returns whether only the end of the contact, or a failure, ends the mode.
+    pub(super) fn lasts(&self) -> bool {
+        self.tables("done").next().is_none() && self.exits("go").all(|exit| exit.is_lost())
+    }
+
     /// Returns whether any exit waits for the value of a port.
     pub(super) fn watches(&self) -> bool {
         let exits = ["go", "done", "fail"].into_iter().flat_map(|kind| self.tables(kind));

@@ -39,7 +39,7 @@ fn slow(arm: &Controlled<'_>, mode: &ModeLaw<'_>, feature: &Feature) -> Option<D
     let gain = largest_gain(arm, feature, quantity)?;
     let scheduled = feature.schedules.iter().map(|schedule| schedule.max.max(1.0)).product::<f64>();
     let rate = feature.kp * scheduled * gain;
-    let is_alone = feature.ki == 0.0 && feature.beside.is_empty();
+    let is_alone = feature.kp > 0.0 && feature.ki == 0.0 && feature.beside.is_empty();
     if rate >= SLOW || !is_alone {
         return limited(mode, feature, quantity, gain);
     }

@@ -13,7 +13,7 @@ use crate::tool::control::law::{Feature, Guidance};
 /// Nodes that guide the sensor along a line.
 const LINE_GUIDES: [&str; 2] = ["ridge_guide", "follow_path"];
 /// Largest angle between a line and an axis of the sensor along which the line lies [rad].
-pub(super) const ALONG: f64 = 0.35;
+const ALONG: f64 = 0.35;
 /// Largest part of an axis along z of the sensor with which it lies in the plane of the pad [1].
 const LYING: f64 = 0.5;
 
@@ -45,7 +45,7 @@ fn along_line(arm: &Controlled<'_>, mode: &ModeLaw<'_>) -> Option<Diagnostic> {
     let why = match constants.next().map(|constant| &*constant.node).or_else(guide) {
         Some(follower) if stated.as_ref().is_none_or(Line::is_longer) => format!("the line that `{follower}` follows"),
         // It crawls along the line, which matters where nothing but the end of the contact ends it.
-        _ if mode.tables("done").next().is_some() || mode.exits("go").any(|exit| !exit.is_lost()) => return None,
+        _ if !mode.lasts() => return None,
         _ => stated.filter(Line::is_longer)?.to_string(),
     };
     let message = format!(

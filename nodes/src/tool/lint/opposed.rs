@@ -1,9 +1,10 @@
 //! Motions that work against each other in one mode, and motions into an object that is already pressed.
 
-use tactflow_runtime::source::{Code, Diagnostic, Diagnostics, Item, Table};
+use tactflow_runtime::source::{Code, Diagnostic, Diagnostics, Item, Table, Value};
 
 use super::exits::Exit;
 use super::modes::GUIDES;
+use super::reach::watched;
 use super::{Controlled, ModeLaw};
 use crate::motion::COMPONENTS;
 use crate::tool::control::law::{Feature, Guidance};
@@ -12,8 +13,9 @@ use crate::tool::control::settings::source;
 pub(super) fn check(arm: &Controlled<'_>, found: &mut Diagnostics) {
     for mode in &arm.modes {
         let contradiction = retreat(mode).or_else(|| held(mode)).or_else(|| push(arm, mode));
-        found
-            .extend(contradiction.or_else(|| pressed(mode)).or_else(|| dragged(arm, mode)).or_else(|| contended(mode)));
+        found.extend(
+            contradiction.or_else(|| pressed(arm, mode)).or_else(|| dragged(arm, mode)).or_else(|| contended(mode)),
+        );
     }
 }
 
@@ -118,9 +120,9 @@ const SHIFTED: f64 = 0.2;
 
 /// Returns the warning about a constant motion into the object beside the control of a force: without an integral, the
 /// force rests above its setpoint, where the controller moves back as fast.
-fn pressed(mode: &ModeLaw<'_>) -> Option<Diagnostic> {
+fn pressed(arm: &Controlled<'_>, mode: &ModeLaw<'_>) -> Option<Diagnostic> {
     // An approach ends with the contact by which the force is measured, or with the force.
-    if mode.waits_for_contact() || mode.watches() {
+    if mode.waits_for_contact() || waits_for_force(arm, mode) {
         return None;
     }
     let free = || mode.law.constants.iter().filter(|constant| constant.in_contact);
@@ -152,6 +154,19 @@ fn pressed(mode: &ModeLaw<'_>) -> Option<Diagnostic> {
     Some(Diagnostic::new(Code::OpposedMotion, mode.place(&constant.node, "twist"), message).help(&*help))
 }
 
+/// Returns whether an exit waits for a force.
+fn waits_for_force(arm: &Controlled<'_>, mode: &ModeLaw<'_>) -> bool {
+    let exits = ["go", "done"].into_iter().flat_map(|kind| mode.tables(kind)).filter_map(Value::as_table);
+    let is_force = |when: &str| {
+        let quantity = watched(arm, mode, when);
+        matches!(quantity.as_deref().or(when.rsplit('.').next()), Some("pressure" | "force"))
+    };
+    exits
+        .filter(|exit| exit.get("above").is_some() || exit.get("within").is_some())
+        .filter_map(|exit| exit.get("when")?.as_str())
+        .any(is_force)
+}
+
 /// Distance from its setpoint at which a constant motion may hold a contact [m].
 const BESIDE: f64 = 0.001;
 
@@ -161,8 +176,8 @@ fn dragged(arm: &Controlled<'_>, mode: &ModeLaw<'_>) -> Option<Diagnostic> {
     let is_still = |object: &Table| {
         object.get("motion").is_none_or(|motion| matches!(&motion.item, Item::Array(steps) if steps.is_empty()))
     };
-    // A motion beside the control follows an object that moves.
-    if arm.objects().next().is_none() || !arm.objects().all(is_still) {
+    // A motion beside the control follows an object that moves, and a short one comes to no rest.
+    if arm.objects().next().is_none() || !arm.objects().all(is_still) || !mode.lasts() {
         return None;
     }
     let constants = mode.law.constants.iter().filter(|constant| constant.in_contact);
@@ -172,6 +187,7 @@ fn dragged(arm: &Controlled<'_>, mode: &ModeLaw<'_>) -> Option<Diagnostic> {
             let is_shifted = |feature: &&Feature| {
                 feature.ki == 0.0
                     && feature.kp > 0.0
+                    && feature.schedules.is_empty()
                     && feature.column[i] != 0.0
                     && feature.is_free(&mode.nodes)
                     && mode.quantity(feature) == Some(["x", "y"][i])

@@ -48,7 +48,7 @@ fn exit_bounds(arm: &Controlled<'_>, mode: &ModeLaw<'_>) -> Diagnostics {
 }
 
 /// Returns what an exit watches, through filters, or by the name that a part gives it.
-fn watched(arm: &Controlled<'_>, mode: &ModeLaw<'_>, when: &str) -> Option<String> {
+pub(super) fn watched(arm: &Controlled<'_>, mode: &ModeLaw<'_>, when: &str) -> Option<String> {
     let measured = way(&mode.nodes, when).measured;
     if let Some(quantity) = mode.quantity_of(&measured) {
         return Some(quantity.to_owned());
@@ -70,7 +70,7 @@ fn thresholds(arm: &Controlled<'_>, mode: &ModeLaw<'_>) -> Diagnostics {
         let (limit, limit_key) = force_limit(arm, mode, "force").filter(|(_, key)| key.ends_with("_n"))?;
         let least = mode.nodes.number(node, key).filter(|least| *least >= limit)?;
         let message = format!(
-            "`{}` needs {least} N, but the limit `{limit_key}` is {limit}: the pad never feels that much",
+            "`{}` needs {least} N, but the limit `{limit_key}` is {limit}: the sensor never presses that hard",
             node.name
         );
         let help = format!("write `{key}` well below {limit}, or raise `{limit_key}` in [limits]");
@@ -123,14 +123,14 @@ pub(super) fn setpoint(arm: &Controlled<'_>, mode: &ModeLaw<'_>, feature: &Featu
     Some(Diagnostic::new(Code::UnreachableSetpoint, mode.place(node, &format!("setpoint.{name}")), message).help(help))
 }
 
-/// Returns the warning about a deadband in which a feature rests whatever it measures, or without a contact.
+/// Returns the warning about a deadband in which a feature always rests, or for good once the contact is lost.
 fn always_resting(arm: &Controlled<'_>, mode: &ModeLaw<'_>, feature: &Feature) -> Option<Diagnostic> {
     let band = deadband(mode, feature)?;
     let (name, path) = (&feature.name, format!("width.{}.outer", feature.name));
     let outer = mode.nodes.number(band, &path)?;
     let largest = largest_error(arm, mode, feature);
     let why = match mode.quantity(feature)? {
-        "pressure" | "force" => {
+        "pressure" | "force" if feature.setpoint == Some(largest) => {
             format!("without a contact its error is {largest}, so once it rests it presses no more")
         }
         _ => format!("no error is larger than {largest}, so it rests wherever the contact is"),

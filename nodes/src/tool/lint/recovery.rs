@@ -26,8 +26,7 @@ impl ModeLaw<'_> {
 
     /// Returns whether the mode moves the sensor away from the object.
     pub(super) fn backs_off(&self) -> bool {
-        let lifts =
-            |guide: &Guidance| matches!(&*guide.kind, "park" | "hold_pose") && guide.passes[2] && !self.rests(guide);
+        let lifts = |guide: &Guidance| guide.kind == "park" && guide.passes[2] && !self.rests(guide);
         self.approach() < 0.0 || self.law.guidance.iter().any(lifts)
     }
 

@@ -221,7 +221,12 @@ impl Net<'_> {
     pub(crate) fn find_candidate(&self, scope: usize, node: Option<usize>, input: &PortSpec) -> Option<&str> {
         // A port that follows from the node would close a loop.
         let follows = |producer: Producer| node.is_some_and(|node| self.upstream(producer.node())[node]);
-        self.scope_ports(scope).candidate(input, |producer| !follows(producer))
+        let ports = self.scope_ports(scope);
+        // What the other inputs follow from has their units too.
+        let upstream = node.map(|node| self.upstream([node])).unwrap_or_default();
+        let is_upstream = |producer: Producer| producer.node().is_some_and(|node| upstream.get(node) == Some(&true));
+        let near = ports.candidate(input, |producer| is_upstream(producer) && !follows(producer));
+        near.or_else(|| ports.candidate(input, |producer| !follows(producer)))
     }
 
     /// Returns the exports of the parts in the graph and in its tasks, and what the tasks call the roles: each with the
