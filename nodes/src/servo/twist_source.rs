@@ -22,10 +22,10 @@ use crate::usual::{USUAL_M_PER_S, USUAL_RAD_PER_S, from_smaller_unit};
 /// component that the projector controls works against the controller: set that entry of P to 0.
 ///
 /// ```toml
-/// [nodes.guide]                       # along the pad's y, while there is a contact
+/// [nodes.guide]                       # about the pad's z, while there is a contact
 /// type = "twist_source"
 /// in.gate = "label.present"
-/// twist = [0, 0.01, 0, 0, 0, 0]       # [m/s, rad/s]
+/// twist = [0, 0, 0, 0, 0, 0.1]        # [m/s, rad/s]
 /// ```
 #[derive(Describe)]
 #[describe(every_tick)]
