@@ -245,7 +245,9 @@ fn foreign(mode: &ModeLaw<'_>, feature: &Feature, quantity: &str, column: [f64; 
 
 /// Returns the warning about a column, with the right one as a fix.
 fn replaced(mode: &ModeLaw<'_>, feature: &Feature, message: String, right: [f64; 6]) -> Diagnostic {
-    let (place, right) = (mode.place_of_column(feature), array(&right.map(three_digits)));
+    // A column that is written keeps its digits; one that is turned has as many as the pose leaves.
+    let right = if feature.turned.is_some() { right.map(three_digits) } else { right };
+    let (place, right) = (mode.place_of_column(feature), array(&right));
     let diagnostic = Diagnostic::new(Code::WrongColumn, place.clone(), behind(feature) + &message);
     match &feature.turned {
         Some(turner) => diagnostic.help(format!(
