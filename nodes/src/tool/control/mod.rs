@@ -9,6 +9,7 @@ pub(super) mod chain;
 pub(super) mod choose;
 pub(super) mod collect;
 pub(super) mod contacts;
+pub(super) mod digits;
 pub(super) mod filters;
 pub(super) mod law;
 pub(super) mod margins;

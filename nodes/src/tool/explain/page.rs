@@ -9,6 +9,7 @@ use super::stability::Stability;
 use super::touch::Approach;
 use super::{Explained, ModeLaw, Motion};
 use crate::motion::COMPONENTS;
+use crate::tool::control::digits::or_none;
 use crate::tool::control::law::Feature;
 use crate::tool::control::schedule::Schedule;
 
@@ -233,9 +234,6 @@ fn place(one: &Stability) -> String {
 
 fn margins(one: &Stability) -> Option<[String; 9]> {
     let margins = one.margins.as_ref()?;
-    let with = |value: Option<f64>, unit: &str, digits: usize| {
-        value.map_or_else(|| "none".to_owned(), |value| format!("{value:.digits$} {unit}"))
-    };
     let stable = |text: String| if margins.is_stable { text } else { "unstable".to_owned() };
     Some([
         match (&one.object, one.by_geometry) {
@@ -244,12 +242,12 @@ fn margins(one: &Stability) -> Option<[String; 9]> {
             (None, _) => GEOMETRY.to_owned(),
         },
         one.feature.clone(),
-        with(margins.crossover_hz, "Hz", 2),
-        stable(with(margins.phase_deg, "deg", 0)),
-        with(margins.gain_db, "dB", 1),
+        or_none(margins.crossover_hz, "Hz", 2),
+        stable(or_none(margins.phase_deg, "deg", 0)),
+        or_none(margins.gain_db, "dB", 1),
         stable(format!("{:.2}", margins.peak_sensitivity)),
         stable(margins.bandwidth()),
-        stable(with(Some(margins.ramp_lag_s * 1e3), "ms", 0)),
+        stable(or_none(Some(margins.ramp_lag_s * 1e3), "ms", 0)),
         stable(format!("{:.3}", margins.noise)),
     ])
 }

@@ -13,6 +13,7 @@ use crate::motion::COMPONENTS;
 use crate::motion::axis::wrap_axial;
 use crate::tool::control::collect::law;
 use crate::tool::control::contacts::Contact;
+use crate::tool::control::digits::to_three_digits;
 use crate::tool::control::law::{Feature, Law};
 use crate::tool::control::settings::{Nodes, source};
 
@@ -57,7 +58,7 @@ fn wrong(arm: &Controlled<'_>, mode: &ModeLaw<'_>, feature: &Feature) -> Option<
     let message = format!(
         "the column of `{}` increases its error: `{name}` is {}, but {}",
         feature.name,
-        three_digits(column[first.component]),
+        to_three_digits(column[first.component]),
         first.reason
     );
     Some(replaced(mode, feature, message, right))
@@ -104,7 +105,7 @@ fn aside(
     for [own, other] in pairs {
         let known = Row::of(quantity)?.known.iter().find(|answer| answer.component == *own)?;
         let size = if *own == 2 { column[*own].abs() } else { column[*own].hypot(column[*other]) };
-        (right[*own], right[*other]) = (known.sign * three_digits(size), 0.0);
+        (right[*own], right[*other]) = (known.sign * to_three_digits(size), 0.0);
     }
     let message = format!(
         "the column of `{name}` moves the sensor more with `{}`, which does not change `{quantity}`, than with `{}`, which does",
@@ -115,11 +116,6 @@ fn aside(
 
 /// Angle from the wrap of a direction within which noise takes it to the other side [rad].
 const WRAP: f64 = 0.2;
-
-/// Returns a number with three digits.
-fn three_digits(number: f64) -> f64 {
-    format!("{number:.2e}").parse().unwrap_or(number)
-}
 
 /// Returns the warning about a column that increases the offset of a line. The direction of the line is the setpoint of
 /// its angle, and the offset is positive on the side of the direction turned by +90 degrees.
@@ -246,7 +242,7 @@ fn foreign(mode: &ModeLaw<'_>, feature: &Feature, quantity: &str, column: [f64; 
 /// Returns the warning about a column, with the right one as a fix.
 fn replaced(mode: &ModeLaw<'_>, feature: &Feature, message: String, right: [f64; 6]) -> Diagnostic {
     // A column that is written keeps its digits; one that is turned has as many as the pose leaves.
-    let right = if feature.turned.is_some() { right.map(three_digits) } else { right };
+    let right = if feature.turned.is_some() { right.map(to_three_digits) } else { right };
     let (place, right) = (mode.place_of_column(feature), array(&right));
     let diagnostic = Diagnostic::new(Code::WrongColumn, place.clone(), behind(feature) + &message);
     match &feature.turned {

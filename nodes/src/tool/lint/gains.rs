@@ -3,9 +3,9 @@
 use tactflow_runtime::source::{Code, Diagnostic, Diagnostics, Edit};
 
 use super::reach::{deadband, largest_error, setpoint};
-use super::stability::rounded;
 use super::{Controlled, ModeLaw};
 use crate::tool::control::contacts::Answer;
+use crate::tool::control::digits::to_two_digits;
 use crate::tool::control::law::Feature;
 
 pub(super) fn check(arm: &Controlled<'_>, found: &mut Diagnostics) {
@@ -79,7 +79,7 @@ fn limited(mode: &ModeLaw<'_>, feature: &Feature, quantity: &str, gain: f64) -> 
     let message = format!(
         "the control of `{name}` has a limit of {limit} {unit}/s: an error of {usual} {unit} takes {time:.0} s"
     );
-    let least = rounded(usual / gain, libm::ceil);
+    let least = to_two_digits(usual / gain, libm::ceil);
     let help = format!("write a `limit` of {least} {unit}/s or more, or remove it");
     Some(Diagnostic::new(Code::UnusualGain, place, message).help(help))
 }

@@ -7,8 +7,8 @@ use tactflow_runtime::graph::OutlinedBlock;
 use tactflow_runtime::source::{Code, Diagnostic, Diagnostics, Value};
 
 use super::modes::upstream;
-use super::stability::rounded;
 use super::{Controlled, ModeLaw};
+use crate::tool::control::digits::to_two_digits;
 use crate::tool::control::filters::way;
 use crate::tool::control::law::Feature;
 use crate::tool::control::settings::source;
@@ -139,7 +139,7 @@ fn always_resting(arm: &Controlled<'_>, mode: &ModeLaw<'_>, feature: &Feature) -
         return None;
     }
     let message = format!("`{name}` rests up to an error of {outer}, but {why}");
-    let [inner, outer] = [0.05, 0.1].map(|share| rounded(share * largest, libm::floor));
+    let [inner, outer] = [0.05, 0.1].map(|share| to_two_digits(share * largest, libm::floor));
     let help = format!("write widths well below {largest}: `width.{name} = {{ inner = {inner}, outer = {outer} }}`");
     Some(Diagnostic::new(Code::UnreachableSetpoint, mode.place(&band.name, &path), message).help(help))
 }

@@ -9,6 +9,7 @@ use tactflow_runtime::source::{Code, Diagnostic, Diagnostics, Edit};
 use super::{Controlled, ModeLaw};
 use crate::tool::control::choose::{Wanted, factor};
 use crate::tool::control::contacts::Contact;
+use crate::tool::control::digits::{down_to_two_digits, to_two_digits};
 use crate::tool::control::filters::Filter;
 use crate::tool::control::law::Feature;
 use crate::tool::control::margins::{Margins, margins, rough_margins};
@@ -173,7 +174,7 @@ fn low_margin(
             .help("no gain keeps the margins: use faster filters, or a smaller `ki` in proportion to `kp`");
     };
     let gains = [("kp", feature.kp), ("ki", feature.ki), ("kd", feature.kd)];
-    let gains = gains.map(|(key, gain)| (key, rounded_down(gain * factor)));
+    let gains = gains.map(|(key, gain)| (key, down_to_two_digits(gain * factor)));
     let written = gains.iter().filter(|(_, gain)| *gain != 0.0);
     let text: Vec<String> = written.clone().map(|(key, gain)| format!("`{key} = {gain}`")).collect();
     let help = format!("write {} or less in the gains of `{name}`", text.join(" and "));
@@ -204,23 +205,6 @@ fn quick(mode: &ModeLaw<'_>, feature: &Feature, loops: &[Loop], first: f64) -> O
         })
     };
     std::iter::successors(Some(first), |factor| Some(factor * 0.95)).take(40).find(|factor| is_quick(*factor))
-}
-
-/// Returns a number with two digits that is not larger.
-fn rounded_down(number: f64) -> f64 {
-    if number <= 0.0 {
-        return 0.0;
-    }
-    rounded(number, libm::floor)
-}
-
-/// Returns a number with two digits.
-pub(super) fn rounded(number: f64, round: impl Fn(f64) -> f64) -> f64 {
-    let digits = 1.0 - libm::floor(libm::log10(number.abs()));
-    let scale = libm::pow(10.0, digits);
-    let exact = round(number * scale) / scale;
-    // To the nearest number with few digits.
-    format!("{exact:.4}").parse().unwrap_or(exact)
 }
 
 /// Returns the filter with the largest delay, and its number.
@@ -255,9 +239,9 @@ fn slow_filter(mode: &ModeLaw<'_>, feature: &Feature, contacts: &[Contact], slow
     };
     let (value, more) = match key {
         // Rounded up.
-        "cutoff_hz" => (rounded(old / share, libm::ceil), "more"),
+        "cutoff_hz" => (to_two_digits(old / share, libm::ceil), "more"),
         "window" => (libm::floor(old * share).max(1.0), "less"),
-        _ => (rounded_down(old * share), "less"),
+        _ => (down_to_two_digits(old * share), "less"),
     };
     let help = format!("write `{key} = {value}` or {more} in `{}`, or smaller gains of `{name}`", slowest.node);
     let diagnostic = diagnostic.help(help);

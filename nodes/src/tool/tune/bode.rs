@@ -9,6 +9,7 @@ use tactflow_runtime::cli::svg::{INK, PlotAxis, STYLES, Svg};
 
 use super::experiment::Line;
 use super::{Tuned, TunedFeature};
+use crate::tool::control::digits::or_none;
 use crate::tool::control::response::Loop;
 
 /// Width of the picture [px].
@@ -83,14 +84,11 @@ fn legend(feature: &TunedFeature, i: usize) -> String {
         (Some(_), _) => format!("{}: not measured", found.object),
         (None, None) => found.object.clone(),
         (None, Some(margins)) => {
-            let with = |value: Option<f64>, unit: &str| {
-                value.map_or_else(|| "none".to_owned(), |value| format!("{value:.1} {unit}"))
-            };
             format!(
                 "{}: phase margin {}, gain margin {}, peak of the sensitivity {:.2}",
                 found.object,
-                with(margins.phase_deg, "deg"),
-                with(margins.gain_db, "dB"),
+                or_none(margins.phase_deg, "deg", 1),
+                or_none(margins.gain_db, "dB", 1),
                 margins.peak_sensitivity
             )
         }

@@ -28,6 +28,7 @@ use super::arguments::{may_draw, write};
 use super::control::chain::chain;
 use super::control::choose::{Wanted, factor};
 use super::control::contacts::{Answer, Contact};
+use super::control::digits::{floored_to_two_digits, rounded_to_three_digits};
 use super::control::law::Feature;
 use super::control::margins::{Margins, margins};
 use super::control::response::Loop;
@@ -412,11 +413,11 @@ fn answer(quantity: &str, fits: &[(&'static str, Fit)]) -> Answer {
         };
         let index = COMPONENTS.iter().position(|name| name == component);
         let slides = index.map_or(0.0, |i| geometry[i]);
-        *entry = Some(if slides.abs() > fit.gain.abs() { slides } else { page::rounded(fit.gain) });
+        *entry = Some(if slides.abs() > fit.gain.abs() { slides } else { rounded_to_three_digits(fit.gain) });
     }
     let Some((_, main)) = fits.first() else { return answer };
-    answer.resonance_hz = main.resonance.map(|(hz, _)| page::rounded(hz));
-    answer.damping_ratio = main.resonance.map(|(_, damping)| page::rounded(damping));
+    answer.resonance_hz = main.resonance.map(|(hz, _)| rounded_to_three_digits(hz));
+    answer.damping_ratio = main.resonance.map(|(_, damping)| rounded_to_three_digits(damping));
     answer.latency_ms = Some((main.latency * 1e4).round() / 10.0);
     answer
 }
@@ -438,8 +439,8 @@ fn propose(feature: Feature, answers: Vec<Found>, contacts: &[Contact], wanted: 
     let each: Vec<Loop> = loops.iter().filter_map(measured).chain(loops.iter().map(|(_, one)| one.clone())).collect();
     let factor = factor(&each, wanted).filter(|_| is_measured && loops.len() == contacts.len());
     // Rounded down, so that the margins hold.
-    let factor = factor.map(|factor| page::rounded_down(feature.kp * factor) / feature.kp);
-    let new = factor.map(|factor| old.map(|gain| page::rounded(gain * factor)));
+    let factor = factor.map(|factor| floored_to_two_digits(feature.kp * factor) / feature.kp);
+    let new = factor.map(|factor| old.map(|gain| rounded_to_three_digits(gain * factor)));
     let loops: Vec<(usize, Loop)> =
         loops.into_iter().map(|(i, around)| (i, around.times(factor.unwrap_or(1.0)))).collect();
     let margins = new.map(|_| loops.iter().map(|(_, around)| margins(around)).collect()).unwrap_or_default();

@@ -9,6 +9,7 @@ use super::cases::Stated;
 use super::step::Step;
 use super::trial::Held;
 use super::{Found, Tuned, TunedFeature, save};
+use crate::tool::control::digits::{or_none, rounded_to_three_digits};
 
 /// Columns of the table of answers.
 const ANSWERS: [&str; 7] = ["contact", "motion", "per m or rad", "resonance", "damping", "latency", "frequencies"];
@@ -35,8 +36,8 @@ fn answers(found: &[Found]) -> String {
             [
                 one.object.clone(),
                 (*component).to_owned(),
-                rounded(fit.gain).to_string(),
-                hz.map_or_else(|| "none".into(), |hz| format!("{hz:.1} Hz")),
+                rounded_to_three_digits(fit.gain).to_string(),
+                or_none(hz, "Hz", 1),
                 damping.map_or_else(String::new, |damping| format!("{damping:.2}")),
                 format!("{:.0} ms", fit.latency * 1e3),
                 format!("{}, {:.0} % off", fit.frequencies, fit.residual * 100.0),
@@ -71,14 +72,11 @@ fn gains(feature: &TunedFeature) -> String {
     };
     let [old_kp, old_ki, old_kd] = feature.old;
     let rows = feature.answers.iter().zip(&feature.margins).map(|(found, margins)| {
-        let with = |value: Option<f64>, unit: &str, digits: usize| {
-            value.map_or_else(|| "none".to_owned(), |value| format!("{value:.digits$} {unit}"))
-        };
         [
             found.object.clone(),
-            with(margins.crossover_hz, "Hz", 2),
-            with(margins.phase_deg, "deg", 0),
-            with(margins.gain_db, "dB", 1),
+            or_none(margins.crossover_hz, "Hz", 2),
+            or_none(margins.phase_deg, "deg", 0),
+            or_none(margins.gain_db, "dB", 1),
             format!("{:.2}", margins.peak_sensitivity),
             margins.bandwidth(),
         ]
@@ -92,7 +90,9 @@ fn gains(feature: &TunedFeature) -> String {
 fn settled(tuned: &Tuned) -> String {
     let mut text = String::new();
     for one in &tuned.settled {
-        let error = |held: &Held| held.error.map_or_else(|| "unknown".into(), |error| rounded(error).to_string());
+        let error = |held: &Held| {
+            held.error.map_or_else(|| "unknown".into(), |error| rounded_to_three_digits(error).to_string())
+        };
         let (old, new) = (error(&one.old), error(&one.new));
         let _ = write!(
             text,
@@ -100,7 +100,7 @@ fn settled(tuned: &Tuned) -> String {
             one.object, one.feature
         );
         if let Some((old, new)) = one.old.step.zip(one.new.step) {
-            let (size, old, new) = (rounded(new.size), followed(&old), followed(&new));
+            let (size, old, new) = (rounded_to_three_digits(new.size), followed(&old), followed(&new));
             let _ = write!(text, ". A step of {size} {old} with the old gains, and {new} with the new ones");
         }
         match &one.failure {
@@ -149,34 +149,4 @@ fn lines(tuned: &Tuned) -> String {
         text += "]\n";
     }
     text
-}
-
-/// Rounds a number to three digits.
-pub(super) fn rounded(value: f64) -> f64 {
-    digits(value, 3, f64::round)
-}
-
-/// Rounds a number down to two digits.
-pub(super) fn rounded_down(value: f64) -> f64 {
-    digits(value, 2, f64::floor)
-}
-
-fn digits(value: f64, digits: i32, round: impl Fn(f64) -> f64) -> f64 {
-    if value == 0.0 || !value.is_finite() {
-        return value;
-    }
-    let scale = 10.0_f64.powi(digits - 1 - value.abs().log10().floor() as i32);
-    // Through text, so that no digits of the division are left.
-    format!("{:e}", round(value * scale) / scale).parse().unwrap_or(value)
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_number_keeps_three_digits_and_a_gain_never_grows() {
-        assert_eq!([12.3456, -0.012345, 0.0, 1234.5].map(rounded), [12.3, -0.0123, 0.0, 1230.0]);
-        assert_eq!([12.99, 0.0199, 3.5].map(rounded_down), [12.0, 0.019, 3.5]);
-    }
 }
