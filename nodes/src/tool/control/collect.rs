@@ -76,9 +76,9 @@ impl Passage {
         passage
     }
 
-    /// Returns whether nothing stands in the way that may be closed.
-    fn is_free(&self, nodes: &Nodes<'_>) -> bool {
-        self.sides.is_empty() && self.gates.iter().all(|gate| nodes.is_set(gate) == Some(true))
+    /// Returns whether no gate or switch stands in the way that may be closed.
+    fn is_open(&self, nodes: &Nodes<'_>) -> bool {
+        self.sides.is_empty() && self.gates.iter().all(|gate| nodes.is_open(gate))
     }
 }
 
@@ -154,7 +154,7 @@ fn collect<'a>(nodes: &Nodes<'a>, port: &str, passage: &Passage, law: &mut Law, 
         kind => {
             let is_wired = |i: usize| kind != "compose_twist" || source(node, COMPONENTS[i]).is_some();
             let (port, passes) = (port.to_owned(), passage.selecting(is_wired).moves());
-            law.guidance.push(Guidance { port, kind: kind.to_owned(), passes, is_free: passage.is_free(nodes) });
+            law.guidance.push(Guidance { port, kind: kind.to_owned(), passes, is_open: passage.is_open(nodes) });
         }
     }
     path.pop();
@@ -188,11 +188,11 @@ fn switch<'a>(nodes: &Nodes<'a>, node: &'a OutlinedBlock, passage: &Passage, law
 fn constant(nodes: &Nodes<'_>, node: &OutlinedBlock, passage: &Passage) -> Option<Constant> {
     let twist = passage.of(nodes.value(node, "twist").and_then(|twist| twist.value.read()).unwrap_or_default());
     let gate = source(node, "gate");
-    let open = gate.map_or(Some(true), |gate| nodes.is_set(gate));
-    if open == Some(false) {
+    if gate.and_then(|gate| nodes.is_set(gate)) == Some(false) {
         return None;
     }
-    let is_free = passage.is_free(nodes) && open == Some(true);
-    let in_contact = is_free || passage.is_free(nodes) && gate.is_some_and(|gate| gate.ends_with(".present"));
-    twist.iter().any(|part| *part != 0.0).then(|| Constant { node: node.name.clone(), twist, is_free, in_contact })
+    let is_open = passage.is_open(nodes) && gate.is_none_or(|gate| nodes.is_open(gate));
+    let is_open_in_contact = passage.is_open(nodes) && gate.is_none_or(|gate| nodes.is_open_in_contact(gate));
+    let name = node.name.clone();
+    twist.iter().any(|part| *part != 0.0).then_some(Constant { node: name, twist, is_open, is_open_in_contact })
 }

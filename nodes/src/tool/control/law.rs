@@ -68,10 +68,10 @@ pub(crate) struct Constant {
     pub(crate) twist: [f64; 6],
     /// Whether no gate or switch stands in its way that may be closed.
     #[serde(skip)]
-    pub(crate) is_free: bool,
-    /// The same during a contact.
+    pub(crate) is_open: bool,
+    /// Whether no gate or switch stands in its way that may be closed during a contact.
     #[serde(skip)]
-    pub(crate) in_contact: bool,
+    pub(crate) is_open_in_contact: bool,
 }
 
 /// A node that moves the arm by a law of its own.
@@ -84,7 +84,7 @@ pub(crate) struct Guidance {
     pub(crate) passes: [bool; 6],
     /// Whether no gate or switch stands in its way that may be closed.
     #[serde(skip)]
-    pub(crate) is_free: bool,
+    pub(crate) is_open: bool,
 }
 
 impl Guidance {
@@ -168,9 +168,8 @@ impl Feature {
 
     /// Returns whether it moves the arm whenever it is present: no gate or switch stands in its way that may be closed
     /// during a contact.
-    pub(crate) fn is_free(&self, nodes: &Nodes<'_>) -> bool {
-        let is_open = |gate: &String| nodes.is_set(gate) == Some(true) || gate.ends_with(".present");
-        self.sides.is_empty() && self.gates.iter().all(is_open)
+    pub(crate) fn is_open_in_contact(&self, nodes: &Nodes<'_>) -> bool {
+        self.sides.is_empty() && self.gates.iter().all(|gate| nodes.is_open_in_contact(gate))
     }
 
     /// Returns the delay of the filters that smooth it [s].

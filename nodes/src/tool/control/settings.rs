@@ -79,6 +79,16 @@ impl<'a> Nodes<'a> {
         Some(self.mode.is_some_and(|own| own.name == mode.name))
     }
 
+    /// Returns whether a gate behind a flag is open whatever the sensor feels: the flag is set in this mode.
+    pub(crate) fn is_open(&self, flag: &str) -> bool {
+        self.is_set(flag) == Some(true)
+    }
+
+    /// Returns whether a gate behind a flag is open during a contact: the flag is set in this mode, or by the contact.
+    pub(crate) fn is_open_in_contact(&self, flag: &str) -> bool {
+        self.is_open(flag) || flag.ends_with(".present")
+    }
+
     /// Returns the ports that a switch passes in this mode.
     pub(crate) fn sides(&self, switch: &'a OutlinedBlock) -> impl Iterator<Item = &'a str> {
         let set = source(switch, "select").and_then(|flag| self.is_set(flag));

@@ -28,7 +28,7 @@ fn retreat(mode: &ModeLaw<'_>) -> Option<Diagnostic> {
         let least = feature.schedules.iter().map(|schedule| schedule.min).product::<f64>();
         let limit = mode.limit(feature).unwrap_or(f64::INFINITY);
         let most = feature.setpoint.map(|setpoint| (feature.kp * least * setpoint).min(limit) * feature.column[2]);
-        is_force && feature.is_free(&mode.nodes) && most.is_some_and(|most| most > 0.0 && most >= speed)
+        is_force && feature.is_open_in_contact(&mode.nodes) && most.is_some_and(|most| most > 0.0 && most >= speed)
     };
     let feature = mode.moving().find(presses)?;
     let message = format!(
@@ -41,11 +41,11 @@ fn retreat(mode: &ModeLaw<'_>) -> Option<Diagnostic> {
 
 /// Returns the node that moves the sensor away from the object in a mode, and its speed [m/s].
 fn away<'a>(mode: &'a ModeLaw<'_>) -> Option<(&'a str, f64)> {
-    let all_free = mode.law.constants.iter().all(|constant| constant.is_free || constant.twist[2] == 0.0);
+    let all_open = mode.law.constants.iter().all(|constant| constant.is_open || constant.twist[2] == 0.0);
     let constants = || mode.law.constants.iter().map(|constant| (&*constant.node, constant.twist[2]));
     let speed: f64 = constants().map(|(_, speed)| speed).sum();
-    let constant = constants().find(|(_, own)| all_free && speed < 0.0 && *own < 0.0).map(|(node, _)| (node, -speed));
-    let parks = |guide: &&Guidance| guide.kind == "park" && guide.is_free && guide.passes[2] && !mode.rests(guide);
+    let constant = constants().find(|(_, own)| all_open && speed < 0.0 && *own < 0.0).map(|(node, _)| (node, -speed));
+    let parks = |guide: &&Guidance| guide.kind == "park" && guide.is_open && guide.passes[2] && !mode.rests(guide);
     // It is slower at the end of its way.
     let park = || mode.law.guidance.iter().find(parks).map(|guide| (guide.node(), 0.0));
     constant.or_else(park)
@@ -56,8 +56,8 @@ fn held(mode: &ModeLaw<'_>) -> Option<Diagnostic> {
     let (guide, feature, i) = mode.law.guidance.iter().find_map(|guide| {
         let holds = holds(mode, guide)?;
         let moves = |feature: &Feature| (0..6).find(|i| holds[*i] && guide.passes[*i] && feature.column[*i] != 0.0);
-        let mut free = mode.moving().filter(|feature| guide.is_free && feature.is_free(&mode.nodes));
-        free.find_map(|feature| Some((guide, feature, moves(feature)?)))
+        let mut open = mode.moving().filter(|feature| guide.is_open && feature.is_open_in_contact(&mode.nodes));
+        open.find_map(|feature| Some((guide, feature, moves(feature)?)))
     })?;
     let message = format!(
         "{}`{}` and `{}` both move `{}`: one holds the sensor at a place, the other one moves it to its setpoint, and it \
@@ -76,9 +76,8 @@ fn holds(mode: &ModeLaw<'_>, guide: &Guidance) -> Option<[bool; 6]> {
     let node = mode.nodes.node(guide.node())?;
     let moves = |key: &str| mode.nodes.number(node, key).is_some_and(|speed| speed > 0.0);
     let (linear, angular) = (moves("speed_m_per_s"), moves("speed_rad_per_s"));
-    let is_open = |gate: &str| gate.ends_with(".present") || mode.nodes.is_set(gate) == Some(true);
     match guide.kind.as_str() {
-        "hold_pose" if source(node, "gate").is_none_or(is_open) => {
+        "hold_pose" if source(node, "gate").is_none_or(|gate| mode.nodes.is_open_in_contact(gate)) => {
             Some(std::array::from_fn(|i| if i < 3 { linear } else { angular }))
         }
         "follow_path" => {
@@ -125,9 +124,9 @@ fn pressed(arm: &Controlled<'_>, mode: &ModeLaw<'_>) -> Option<Diagnostic> {
     if mode.waits_for_contact() || waits_for_force(arm, mode) {
         return None;
     }
-    let free = || mode.law.constants.iter().filter(|constant| constant.in_contact);
-    let speed: f64 = free().map(|constant| constant.twist[2]).sum();
-    let constant = free().find(|constant| constant.twist[2] > 0.0)?;
+    let open = || mode.law.constants.iter().filter(|constant| constant.is_open_in_contact);
+    let speed: f64 = open().map(|constant| constant.twist[2]).sum();
+    let constant = open().find(|constant| constant.twist[2] > 0.0)?;
     let shift = |feature: &Feature| speed / (feature.kp * feature.column[2]);
     let is_shifted = |feature: &&Feature| {
         let is_force = matches!(mode.quantity(feature), Some("pressure" | "force"));
@@ -136,7 +135,7 @@ fn pressed(arm: &Controlled<'_>, mode: &ModeLaw<'_>) -> Option<Diagnostic> {
         is_force
             && is_left
             && feature.kp > 0.0
-            && feature.is_free(&mode.nodes)
+            && feature.is_open_in_contact(&mode.nodes)
             && feature.schedules.is_empty()
             && feature.column[2] > 0.0
             && feature.setpoint.is_some_and(|setpoint| setpoint > 0.0 && shift(feature) > SHIFTED * setpoint)
@@ -180,7 +179,7 @@ fn dragged(arm: &Controlled<'_>, mode: &ModeLaw<'_>) -> Option<Diagnostic> {
     if arm.objects().next().is_none() || !arm.objects().all(is_still) || !mode.lasts() {
         return None;
     }
-    let constants = mode.law.constants.iter().filter(|constant| constant.in_contact);
+    let constants = mode.law.constants.iter().filter(|constant| constant.is_open_in_contact);
     let (constant, feature, shift) =
         constants.flat_map(|constant| [(constant, 0), (constant, 1)]).find_map(|(constant, i)| {
             let shift = |feature: &Feature| (constant.twist[i] / (feature.kp * feature.column[i])).abs();
@@ -189,7 +188,7 @@ fn dragged(arm: &Controlled<'_>, mode: &ModeLaw<'_>) -> Option<Diagnostic> {
                     && feature.kp > 0.0
                     && feature.schedules.is_empty()
                     && feature.column[i] != 0.0
-                    && feature.is_free(&mode.nodes)
+                    && feature.is_open_in_contact(&mode.nodes)
                     && mode.quantity(feature) == Some(["x", "y"][i])
                     && shift(feature) > BESIDE
             };
@@ -211,13 +210,13 @@ fn dragged(arm: &Controlled<'_>, mode: &ModeLaw<'_>) -> Option<Diagnostic> {
 /// Returns the warning about two forces whose integrals move the same component alone: both setpoints are not reached
 /// together, so the integrals grow against each other.
 fn contended(mode: &ModeLaw<'_>) -> Option<Diagnostic> {
-    let is_free = |feature: &&Feature| {
+    let is_judged = |feature: &&Feature| {
         feature.ki > 0.0
-            && feature.is_free(&mode.nodes)
+            && feature.is_open_in_contact(&mode.nodes)
             && feature.presses_alone()
             && matches!(mode.quantity(feature), Some("pressure" | "force"))
     };
-    let all: Vec<&Feature> = mode.moving().filter(is_free).collect();
+    let all: Vec<&Feature> = mode.moving().filter(is_judged).collect();
     let differs = |one: &Feature, other: &Feature| one.measured != other.measured || one.setpoint != other.setpoint;
     let pairs = all.windows(2).find(|pair| differs(pair[0], pair[1]));
     let [one, other] = pairs? else { return None };
