@@ -18,7 +18,7 @@ struct Passage {
     /// What the projectors, and the adjoints of poses that do not change, make of a twist.
     matrix: Matrix6<f64>,
     /// The last adjoint of a pose that does not change.
-    turned: Option<String>,
+    mount: Option<String>,
     gates: Vec<String>,
     /// Switches whose selection is not known, with the number of the side.
     sides: Vec<(String, usize)>,
@@ -30,7 +30,7 @@ const REST: f64 = 1e-4;
 
 impl Default for Passage {
     fn default() -> Self {
-        Self { matrix: Matrix6::identity(), turned: None, gates: Vec::new(), sides: Vec::new(), delays: Vec::new() }
+        Self { matrix: Matrix6::identity(), mount: None, gates: Vec::new(), sides: Vec::new(), delays: Vec::new() }
     }
 }
 
@@ -52,8 +52,8 @@ impl Passage {
     /// Returns the way before the adjoint of a pose.
     fn turned(&self, node: &str, pose: &Pose) -> Self {
         let columns: [Vector6<f64>; 6] = std::array::from_fn(|i| adjoint(pose, &Twist(Vector6::ith(i, 1.0))).0);
-        let turned = Some(node.to_owned());
-        Self { matrix: self.matrix * Matrix6::from_columns(&columns), turned, ..self.clone() }
+        let mount = Some(node.to_owned());
+        Self { matrix: self.matrix * Matrix6::from_columns(&columns), mount, ..self.clone() }
     }
 
     /// Returns the components of the arm that a node behind it can move.
@@ -147,7 +147,7 @@ fn collect<'a>(nodes: &Nodes<'a>, port: &str, passage: &Passage, law: &mut Law, 
                 feature.gates.extend(passage.gates.iter().cloned());
                 feature.filters.extend(passage.delays.iter().cloned());
                 feature.sides.clone_from(&passage.sides);
-                feature.turned.clone_from(&passage.turned);
+                feature.mount.clone_from(&passage.mount);
                 feature
             }));
         }

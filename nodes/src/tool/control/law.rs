@@ -49,7 +49,7 @@ pub(crate) struct Feature {
     pub(crate) gates: Vec<String>,
     /// The `adjoint` that turns its column.
     #[serde(skip)]
-    pub(crate) turned: Option<String>,
+    pub(crate) mount: Option<String>,
     /// The switches that it passes, with the number of the side, where the selection is not known.
     #[serde(skip)]
     pub(crate) sides: Vec<(String, usize)>,
@@ -205,7 +205,7 @@ pub(super) fn feature<'a>(nodes: &Nodes<'a>, jacobian: &'a OutlinedBlock, name: 
     let way = error.and_then(|error| source(error, &name)).map(|port| way(nodes, port));
     let measured = way.as_ref().map(|way| way.measured.clone());
     let (filters, gates) = way.map(|way| (way.filters, way.gates)).unwrap_or_default();
-    let (sides, turned) = (Vec::new(), None);
+    let (sides, mount) = (Vec::new(), None);
     let [kp, ki, kd] = ["kp", "ki", "kd"].map(|which| number(which).unwrap_or(0.0));
     let rise = number("rise");
     let compared = error.map(|error| error.name.clone());
@@ -223,7 +223,7 @@ pub(super) fn feature<'a>(nodes: &Nodes<'a>, jacobian: &'a OutlinedBlock, name: 
         setpoint,
         filters,
         gates,
-        turned,
+        mount,
         sides,
         schedules,
         name,

@@ -66,12 +66,12 @@ fn wrong(arm: &Controlled<'_>, mode: &ModeLaw<'_>, feature: &Feature) -> Option<
 
 /// Returns the column of a feature before all projectors, as it is behind a mount that turns it.
 fn written(mode: &ModeLaw<'_>, feature: &Feature) -> Option<[f64; 6]> {
-    if feature.turned.is_some() { Some(feature.column) } else { mode.column(feature) }
+    if feature.mount.is_some() { Some(feature.column) } else { mode.column(feature) }
 }
 
 /// Returns the start of a message about a column that a mount turns.
 fn behind(feature: &Feature) -> String {
-    feature.turned.as_ref().map(|turner| format!("behind `{turner}`, ")).unwrap_or_default()
+    feature.mount.as_ref().map(|turner| format!("behind `{turner}`, ")).unwrap_or_default()
 }
 
 /// Returns the components that change a quantity, each with one that changes another quantity.
@@ -208,7 +208,7 @@ fn foreign(mode: &ModeLaw<'_>, feature: &Feature, quantity: &str, column: [f64; 
         is_exchanged.then_some((other, other_column))
     });
     // Behind a mount, the columns that are written are others.
-    if let Some((other, other_column)) = other.filter(|_| feature.turned.is_none()) {
+    if let Some((other, other_column)) = other.filter(|_| feature.mount.is_none()) {
         let message = format!(
             "the columns of `{}` and `{}` are exchanged: {moved} does not change `{}`",
             feature.name, other.name, feature.name
@@ -242,10 +242,10 @@ fn foreign(mode: &ModeLaw<'_>, feature: &Feature, quantity: &str, column: [f64; 
 /// Returns the warning about a column, with the right one as a fix.
 fn replaced(mode: &ModeLaw<'_>, feature: &Feature, message: String, right: [f64; 6]) -> Diagnostic {
     // A column that is written keeps its digits; one that is turned has as many as the pose leaves.
-    let right = if feature.turned.is_some() { right.map(to_three_digits) } else { right };
+    let right = if feature.mount.is_some() { right.map(to_three_digits) } else { right };
     let (place, right) = (mode.place_of_column(feature), array(&right));
     let diagnostic = Diagnostic::new(Code::WrongColumn, place.clone(), behind(feature) + &message);
-    match &feature.turned {
+    match &feature.mount {
         Some(turner) => diagnostic.help(format!(
             "behind `{turner}`, the column must be {right}: turn the column that is written, or check the pose"
         )),
