@@ -64,6 +64,19 @@ impl<'a> Nodes<'a> {
         self.index.nodes.get(name).copied()
     }
 
+    /// Returns the nodes that a port depends on.
+    pub(crate) fn upstream(&self, port: &str) -> Vec<&'a OutlinedBlock> {
+        let mut open: Vec<&OutlinedBlock> = self.writer(port).into_iter().collect();
+        let (mut seen, mut found) = (BTreeSet::new(), Vec::new());
+        while let Some(node) = open.pop() {
+            if seen.insert(&*node.name) {
+                found.push(node);
+                open.extend(node.wires.iter().filter_map(|wire| self.writer(&wire.source)));
+            }
+        }
+        found
+    }
+
     /// Returns whether a flag is set in this mode, if it is the flag of a mode, or made of such flags.
     pub(crate) fn is_set(&self, flag: &str) -> Option<bool> {
         if let Some(node) = self.writer(flag) {

@@ -6,9 +6,10 @@ use std::f64::consts::FRAC_PI_2;
 use tactflow_runtime::graph::OutlinedBlock;
 use tactflow_runtime::source::{Code, Diagnostic, Diagnostics, Edit, Item};
 
+use super::arm::Arm;
 use super::lines::{line_angle, line_axis};
+use super::mode_law::ModeLaw;
 use super::rows::{Answer, Row};
-use super::{Controlled, ModeLaw};
 use crate::motion::COMPONENTS;
 use crate::motion::axis::wrap_axial;
 use crate::tool::control::collect::law;
@@ -20,7 +21,7 @@ use crate::tool::control::settings::{Nodes, source};
 /// Largest radius of an object that a pad rolls on [m].
 const LARGEST_RADIUS: f64 = 0.1;
 
-pub(super) fn check(arm: &Controlled<'_>, found: &mut Diagnostics) {
+pub(super) fn check(arm: &Arm<'_>, found: &mut Diagnostics) {
     for mode in &arm.modes {
         found.extend(mode.moving().filter_map(|feature| wrong(arm, mode, feature)));
         found.extend(idle(arm, mode));
@@ -29,7 +30,7 @@ pub(super) fn check(arm: &Controlled<'_>, found: &mut Diagnostics) {
 }
 
 /// Returns the warning about a column that increases the error of its feature, or that does not change the feature.
-fn wrong(arm: &Controlled<'_>, mode: &ModeLaw<'_>, feature: &Feature) -> Option<Diagnostic> {
+fn wrong(arm: &Arm<'_>, mode: &ModeLaw<'_>, feature: &Feature) -> Option<Diagnostic> {
     let Some((quantity, row)) = mode.quantity(feature).and_then(|quantity| Some((quantity, Row::of(quantity)?))) else {
         return reversed(arm, mode, feature).or_else(|| offset(arm, mode, feature));
     };
@@ -87,7 +88,7 @@ fn pairs(quantity: &str) -> &'static [[usize; 2]] {
 /// Returns the warning about a column that slides or rolls a contact more along the other axis than along its own, or that
 /// slides it more than it presses. With two such columns the contact circles around its setpoint, or runs away from it.
 fn aside(
-    arm: &Controlled<'_>,
+    arm: &Arm<'_>,
     mode: &ModeLaw<'_>,
     feature: &Feature,
     (quantity, column): (&str, [f64; 6]),
@@ -119,7 +120,7 @@ const WRAP: f64 = 0.2;
 
 /// Returns the warning about a column that increases the offset of a line. The direction of the line is the setpoint of
 /// its angle, and the offset is positive on the side of the direction turned by +90 degrees.
-fn offset(arm: &Controlled<'_>, mode: &ModeLaw<'_>, feature: &Feature) -> Option<Diagnostic> {
+fn offset(arm: &Arm<'_>, mode: &ModeLaw<'_>, feature: &Feature) -> Option<Diagnostic> {
     let is_stated = arm.contacts.iter().any(|contact| contact.features.contains_key("offset"));
     if mode.quantity(feature)? != "offset" || is_stated {
         return None;
@@ -162,7 +163,7 @@ fn is_outweighed(row: &Row, column: &[f64; 6], answer: &Answer) -> bool {
 }
 
 /// Returns the warning about a column that increases the error of a feature of which only the bench says how it answers.
-fn reversed(arm: &Controlled<'_>, mode: &ModeLaw<'_>, feature: &Feature) -> Option<Diagnostic> {
+fn reversed(arm: &Arm<'_>, mode: &ModeLaw<'_>, feature: &Feature) -> Option<Diagnostic> {
     let quantity = feature.quantity()?;
     let column = mode.column(feature)?;
     let gain = |contact: &&Contact| Some(contact.features.get(quantity)?.along(&feature.column));
@@ -280,11 +281,11 @@ fn projectors<'a>(nodes: &Nodes<'a>, port: &str) -> Vec<&'a OutlinedBlock> {
 }
 
 /// Returns the warnings about components that a projector selects and that nothing moves.
-fn idle(arm: &Controlled<'_>, mode: &ModeLaw<'_>) -> Diagnostics {
+fn idle(arm: &Arm<'_>, mode: &ModeLaw<'_>) -> Diagnostics {
     projectors(&mode.nodes, &arm.twist).into_iter().flat_map(|projector| idle_axes(arm, mode, projector)).collect()
 }
 
-fn idle_axes(arm: &Controlled<'_>, mode: &ModeLaw<'_>, projector: &OutlinedBlock) -> Diagnostics {
+fn idle_axes(arm: &Arm<'_>, mode: &ModeLaw<'_>, projector: &OutlinedBlock) -> Diagnostics {
     let select = mode.nodes.node(&projector.name).and_then(|node| mode.nodes.value(node, "select"));
     let behind = source(projector, "twist").map(|twist| law(&mode.nodes, twist));
     let Some((setting, behind)) = select.zip(behind) else { return Diagnostics::new() };
@@ -322,7 +323,7 @@ fn idle_axes(arm: &Controlled<'_>, mode: &ModeLaw<'_>, projector: &OutlinedBlock
 }
 
 /// Returns the warnings about columns that no mode uses, although their features have gains.
-fn unused(arm: &Controlled<'_>) -> Diagnostics {
+fn unused(arm: &Arm<'_>) -> Diagnostics {
     let Some(first) = arm.modes.first() else { return Diagnostics::new() };
     // Several nodes can turn the same control into motion.
     let controls = |wanted: &Feature| {
@@ -367,7 +368,7 @@ fn unused(arm: &Controlled<'_>) -> Diagnostics {
 }
 
 /// Returns how to do without the gains of a feature.
-fn without(arm: &Controlled<'_>, feature: &Feature) -> String {
+fn without(arm: &Arm<'_>, feature: &Feature) -> String {
     match is_watched(arm, feature) {
         true => {
             format!("or measure the error of `{}` in a `feature_error` of its own, which no `pid` reads", feature.name)
@@ -377,7 +378,7 @@ fn without(arm: &Controlled<'_>, feature: &Feature) -> String {
 }
 
 /// Returns whether an exit of a mode waits for the error of a feature.
-fn is_watched(arm: &Controlled<'_>, feature: &Feature) -> bool {
+fn is_watched(arm: &Arm<'_>, feature: &Feature) -> bool {
     let Some(error) = feature.compared.as_ref().map(|node| format!("{node}.error.{}", feature.name)) else {
         return false;
     };
@@ -387,7 +388,7 @@ fn is_watched(arm: &Controlled<'_>, feature: &Feature) -> bool {
 
 /// Returns whether a feature is the position along a line whose direction the task controls. Such a position has no
 /// meaning where the line is longer than the pad, and a task is right to leave it out.
-fn is_along_line(arm: &Controlled<'_>, feature: &Feature) -> bool {
+fn is_along_line(arm: &Arm<'_>, feature: &Feature) -> bool {
     let is_along = |mode: &ModeLaw<'_>| line_axis(mode).is_some_and(|axis| mode.quantity(feature) == Some(axis));
     arm.modes.iter().any(is_along)
 }

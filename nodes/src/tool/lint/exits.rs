@@ -2,7 +2,7 @@
 
 use tactflow_runtime::source::{Item, Value};
 
-use super::ModeLaw;
+use super::mode_law::ModeLaw;
 
 /// An exit of a mode that leads to another one.
 pub(super) struct Exit<'a> {

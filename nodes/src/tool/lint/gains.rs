@@ -2,13 +2,14 @@
 
 use tactflow_runtime::source::{Code, Diagnostic, Diagnostics, Edit};
 
-use super::reach::{deadband, largest_error, setpoint};
-use super::{Controlled, ModeLaw};
+use super::arm::Arm;
+use super::mode_law::ModeLaw;
+use super::reach::setpoint;
 use crate::tool::control::contacts::Answer;
 use crate::tool::control::digits::to_two_digits;
 use crate::tool::control::law::Feature;
 
-pub(super) fn check(arm: &Controlled<'_>, found: &mut Diagnostics) {
+pub(super) fn check(arm: &Arm<'_>, found: &mut Diagnostics) {
     for mode in &arm.modes {
         found.extend(mode.moving().filter_map(|feature| unfiltered(mode, feature)));
         found.extend(mode.moving().filter_map(|feature| slow(arm, mode, feature)));
@@ -19,7 +20,7 @@ pub(super) fn check(arm: &Controlled<'_>, found: &mut Diagnostics) {
 }
 
 /// Returns the warning about a feature that has no gain in any mode. One that rests in some modes is right.
-fn resting(arm: &Controlled<'_>, mode: &ModeLaw<'_>, feature: &Feature) -> Option<Diagnostic> {
+fn resting(arm: &Arm<'_>, mode: &ModeLaw<'_>, feature: &Feature) -> Option<Diagnostic> {
     if feature.pid.is_none() || arm.has_gain(feature) {
         return None;
     }
@@ -34,7 +35,7 @@ const SLOW: f64 = 1.0 / 60.0;
 
 /// Returns the warning about a loop that hardly corrects an error: its column is in another unit, or its control has a
 /// limit that is too small.
-fn slow(arm: &Controlled<'_>, mode: &ModeLaw<'_>, feature: &Feature) -> Option<Diagnostic> {
+fn slow(arm: &Arm<'_>, mode: &ModeLaw<'_>, feature: &Feature) -> Option<Diagnostic> {
     let quantity = mode.quantity(feature)?;
     let gain = largest_gain(arm, feature, quantity)?;
     let scheduled = feature.schedules.iter().map(|schedule| schedule.max.max(1.0)).product::<f64>();
@@ -52,7 +53,7 @@ fn slow(arm: &Controlled<'_>, mode: &ModeLaw<'_>, feature: &Feature) -> Option<D
 
 /// Returns the largest change of a feature for one unit of its control: as the contacts of the bench say, or by geometry.
 /// By how much it rolls, nothing says.
-fn largest_gain(arm: &Controlled<'_>, feature: &Feature, quantity: &str) -> Option<f64> {
+fn largest_gain(arm: &Arm<'_>, feature: &Feature, quantity: &str) -> Option<f64> {
     let stated: Vec<&Answer> = arm.contacts.iter().filter_map(|contact| contact.features.get(quantity)).collect();
     let rolls = |i: &usize| feature.column[*i] != 0.0 && !stated.iter().any(|answer| answer.row()[*i] != 0.0);
     if matches!(quantity, "x" | "y") && [3, 4].iter().any(rolls) {
@@ -108,7 +109,7 @@ fn unfiltered(mode: &ModeLaw<'_>, feature: &Feature) -> Option<Diagnostic> {
 
 /// Returns the warning about an integral that goes on to move its feature while a deadband lets it rest.
 fn hunting(mode: &ModeLaw<'_>, feature: &Feature) -> Option<Diagnostic> {
-    let (name, band) = (&feature.name, deadband(mode, feature)?);
+    let (name, band) = (&feature.name, mode.deadband(feature)?);
     mode.nodes.number(band, &format!("width.{name}.outer"))?;
     let inside = mode.nodes.value(band, "inside")?;
     if feature.ki == 0.0 || inside.value.as_str() != Some("zero") {
@@ -126,10 +127,10 @@ fn hunting(mode: &ModeLaw<'_>, feature: &Feature) -> Option<Diagnostic> {
 
 /// Returns the error at which a mode is left for one in which the feature has no integral. That of a force is large before
 /// it is pressed, and that of a place can be large in both directions.
-fn left_at(arm: &Controlled<'_>, mode: &ModeLaw<'_>, feature: &Feature) -> Option<f64> {
+fn left_at(arm: &Arm<'_>, mode: &ModeLaw<'_>, feature: &Feature) -> Option<f64> {
     let error = format!("{}.error.{}", feature.compared.as_ref()?, feature.name);
     let rests = |name: &str| {
-        let other = arm.modes.iter().find(|mode| mode.own_name() == name);
+        let other = arm.mode(name);
         let mut features = other.into_iter().flat_map(|mode| &mode.law.features);
         features.any(|one| one.id() == feature.id() && one.ki == 0.0)
     };
@@ -145,14 +146,14 @@ fn left_at(arm: &Controlled<'_>, mode: &ModeLaw<'_>, feature: &Feature) -> Optio
 }
 
 /// Returns the warning about an integral that grows at every error, up to a motion at full speed.
-fn windup(arm: &Controlled<'_>, mode: &ModeLaw<'_>, feature: &Feature) -> Option<Diagnostic> {
+fn windup(arm: &Arm<'_>, mode: &ModeLaw<'_>, feature: &Feature) -> Option<Diagnostic> {
     // A setpoint out of reach has its own warning.
     if setpoint(arm, mode, feature).is_some() {
         return None;
     }
     let pid = mode.nodes.node(feature.pid.as_deref()?)?;
     let number = |key: &str| mode.nodes.number(pid, &format!("gains.{}.{key}", feature.name));
-    let is_bound = |error: f64| error < largest_error(arm, mode, feature);
+    let is_bound = |error: f64| error < arm.largest_error(mode, feature);
     if feature.ki == 0.0 || number("within").is_some_and(is_bound) || left_at(arm, mode, feature).is_some_and(is_bound)
     {
         return None;

@@ -6,7 +6,8 @@ use std::fmt;
 use nalgebra::Vector3;
 use tactflow_runtime::source::{Code, Diagnostic, Diagnostics, Table, Value};
 
-use super::{Controlled, ModeLaw};
+use super::arm::Arm;
+use super::mode_law::ModeLaw;
 use crate::motion::pose::pose_of;
 use crate::tool::control::law::{Feature, Guidance};
 
@@ -17,7 +18,7 @@ const ALONG: f64 = 0.35;
 /// Largest part of an axis along z of the sensor with which it lies in the plane of the pad [1].
 const LYING: f64 = 0.5;
 
-pub(super) fn check(arm: &Controlled<'_>, found: &mut Diagnostics) {
+pub(super) fn check(arm: &Arm<'_>, found: &mut Diagnostics) {
     found.extend(arm.modes.iter().filter_map(|mode| along_line(arm, mode)));
 }
 
@@ -26,7 +27,7 @@ pub(super) fn check(arm: &Controlled<'_>, found: &mut Diagnostics) {
 ///
 /// A task that follows a line moves along it. Where the line is longer than the pad, the middle of its print is that of
 /// the pad, and where it ends, the control of the position works against the motion.
-fn along_line(arm: &Controlled<'_>, mode: &ModeLaw<'_>) -> Option<Diagnostic> {
+fn along_line(arm: &Arm<'_>, mode: &ModeLaw<'_>) -> Option<Diagnostic> {
     let positions = line_positions(mode);
     let along = |moves: &dyn Fn(usize) -> bool| {
         let mut axes = positions.iter().map(|axis| usize::from(*axis == "y"));
@@ -112,7 +113,7 @@ impl fmt::Display for Line<'_> {
 }
 
 /// Returns the shortest line that a simulated bench states, on a pad that measures a place: any of them may be touched.
-fn shortest_line<'a>(arm: &Controlled<'a>, mode: &ModeLaw<'_>, feature: &Feature) -> Option<Line<'a>> {
+fn shortest_line<'a>(arm: &Arm<'a>, mode: &ModeLaw<'_>, feature: &Feature) -> Option<Line<'a>> {
     let [from, to] = mode.range(feature)?;
     let lines = arm.objects().filter_map(line);
     let (shape, length) = lines.min_by(|(_, one), (_, other)| one.total_cmp(other))?;

@@ -1,12 +1,12 @@
 //! Modes: rolling without force control, and an approach without a motion.
 
-use std::collections::BTreeSet;
 use std::ops::Range;
 
 use tactflow_runtime::graph::OutlinedBlock;
 use tactflow_runtime::source::{Code, Diagnostic, Diagnostics};
 
-use super::{Controlled, ModeLaw};
+use super::arm::Arm;
+use super::mode_law::ModeLaw;
 use crate::motion::COMPONENTS;
 use crate::tool::control::law::Feature;
 
@@ -14,7 +14,7 @@ use crate::tool::control::law::Feature;
 pub(super) const GUIDES: [&str; 6] =
     ["scan_guide", "ridge_guide", "hold_pose", "follow_path", "follow_surface", "park"];
 
-pub(super) fn check(arm: &Controlled<'_>, found: &mut Diagnostics) {
+pub(super) fn check(arm: &Arm<'_>, found: &mut Diagnostics) {
     for mode in &arm.modes {
         found.extend(rolling(arm, mode));
         found.extend(motionless(arm, mode));
@@ -22,7 +22,7 @@ pub(super) fn check(arm: &Controlled<'_>, found: &mut Diagnostics) {
 }
 
 /// Returns the warning about a mode that waits for a contact, and whose constant motion no projector passes.
-fn motionless(arm: &Controlled<'_>, mode: &ModeLaw<'_>) -> Option<Diagnostic> {
+fn motionless(arm: &Arm<'_>, mode: &ModeLaw<'_>) -> Option<Diagnostic> {
     if !mode.waits_for_contact() || (0..6).any(|i| mode.law.moves(i)) {
         return None;
     }
@@ -35,28 +35,15 @@ fn motionless(arm: &Controlled<'_>, mode: &ModeLaw<'_>) -> Option<Diagnostic> {
         let mut constants = arm.modes.iter().flat_map(|mode| &mode.law.constants);
         constants.all(|constant| constant.node != node.name)
     };
-    let node = upstream(mode, &arm.twist).into_iter().filter(moves).find(rests)?;
+    let node = mode.nodes.upstream(&arm.twist).into_iter().filter(moves).find(rests)?;
     let (name, own) = (&node.name, mode.mode?.name.as_str());
     let message = format!("mode `{own}` waits for a contact, but no projector passes the motion of `{name}`");
     let help = format!("select the components of `{name}` in this mode, or add its twist behind the projector");
     Some(Diagnostic::new(Code::NoApproach, mode.place(name, "twist"), message).help(help))
 }
 
-/// Returns the nodes that a port depends on.
-pub(super) fn upstream<'a>(mode: &ModeLaw<'a>, port: &str) -> Vec<&'a OutlinedBlock> {
-    let mut open: Vec<&OutlinedBlock> = mode.nodes.writer(port).into_iter().collect();
-    let (mut seen, mut found) = (BTreeSet::new(), Vec::new());
-    while let Some(node) = open.pop() {
-        if seen.insert(&*node.name) {
-            found.push(node);
-            open.extend(node.wires.iter().filter_map(|wire| mode.nodes.writer(&wire.source)));
-        }
-    }
-    found
-}
-
 /// Returns the warning about a mode that rolls the sensor over an object while nothing controls the force.
-fn rolling(arm: &Controlled<'_>, mode: &ModeLaw<'_>) -> Option<Diagnostic> {
+fn rolling(arm: &Arm<'_>, mode: &ModeLaw<'_>) -> Option<Diagnostic> {
     let presses = |feature: &Feature| {
         let is_place = matches!(mode.quantity(feature), Some("x" | "y" | "offset" | "orientation"));
         // A force without a gain in any mode has its own warning.

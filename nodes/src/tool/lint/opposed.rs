@@ -2,15 +2,15 @@
 
 use tactflow_runtime::source::{Code, Diagnostic, Diagnostics, Item, Table, Value};
 
+use super::arm::Arm;
 use super::exits::Exit;
+use super::mode_law::ModeLaw;
 use super::modes::GUIDES;
-use super::reach::watched;
-use super::{Controlled, ModeLaw};
 use crate::motion::COMPONENTS;
 use crate::tool::control::law::{Feature, Guidance};
 use crate::tool::control::settings::source;
 
-pub(super) fn check(arm: &Controlled<'_>, found: &mut Diagnostics) {
+pub(super) fn check(arm: &Arm<'_>, found: &mut Diagnostics) {
     for mode in &arm.modes {
         let contradiction = retreat(mode).or_else(|| held(mode)).or_else(|| push(arm, mode));
         found.extend(
@@ -91,7 +91,7 @@ fn holds(mode: &ModeLaw<'_>, guide: &Guidance) -> Option<[bool; 6]> {
 
 /// Returns the warning about a mode that moves on into the object that the modes before have pressed, where nothing that
 /// the pad feels ends it.
-fn push(arm: &Controlled<'_>, mode: &ModeLaw<'_>) -> Option<Diagnostic> {
+fn push(arm: &Arm<'_>, mode: &ModeLaw<'_>) -> Option<Diagnostic> {
     let speed: f64 = mode.law.constants.iter().map(|constant| constant.twist[2]).sum();
     let controls = |mode: &ModeLaw<'_>| mode.moving().any(|feature| feature.column[2] != 0.0);
     let feels = mode.watches() || mode.lost().next().is_some();
@@ -119,7 +119,7 @@ const SHIFTED: f64 = 0.2;
 
 /// Returns the warning about a constant motion into the object beside the control of a force: without an integral, the
 /// force rests above its setpoint, where the controller moves back as fast.
-fn pressed(arm: &Controlled<'_>, mode: &ModeLaw<'_>) -> Option<Diagnostic> {
+fn pressed(arm: &Arm<'_>, mode: &ModeLaw<'_>) -> Option<Diagnostic> {
     // An approach ends with the contact by which the force is measured, or with the force.
     if mode.waits_for_contact() || waits_for_force(arm, mode) {
         return None;
@@ -154,10 +154,10 @@ fn pressed(arm: &Controlled<'_>, mode: &ModeLaw<'_>) -> Option<Diagnostic> {
 }
 
 /// Returns whether an exit waits for a force.
-fn waits_for_force(arm: &Controlled<'_>, mode: &ModeLaw<'_>) -> bool {
+fn waits_for_force(arm: &Arm<'_>, mode: &ModeLaw<'_>) -> bool {
     let exits = ["go", "done"].into_iter().flat_map(|kind| mode.tables(kind)).filter_map(Value::as_table);
     let is_force = |when: &str| {
-        let quantity = watched(arm, mode, when);
+        let quantity = arm.watched(mode, when);
         matches!(quantity.as_deref().or(when.rsplit('.').next()), Some("pressure" | "force"))
     };
     exits
@@ -171,7 +171,7 @@ const BESIDE: f64 = 0.001;
 
 /// Returns the warning about a constant motion along a component in which a feature holds the place of an object that does
 /// not move: the contact rests beside the setpoint, where the controller moves back as fast.
-fn dragged(arm: &Controlled<'_>, mode: &ModeLaw<'_>) -> Option<Diagnostic> {
+fn dragged(arm: &Arm<'_>, mode: &ModeLaw<'_>) -> Option<Diagnostic> {
     let is_still = |object: &Table| {
         object.get("motion").is_none_or(|motion| matches!(&motion.item, Item::Array(steps) if steps.is_empty()))
     };

@@ -3,13 +3,13 @@
 use tactflow_runtime::graph::OutlinedBlock;
 use tactflow_runtime::source::{Code, Diagnostic, Diagnostics};
 
-use super::reach::force_limit;
-use super::{Controlled, ModeLaw};
+use super::arm::Arm;
+use super::mode_law::ModeLaw;
 use crate::tool::control::filters::way;
 use crate::tool::control::law::Feature;
 use crate::tool::control::settings::source;
 
-pub(super) fn check(arm: &Controlled<'_>, found: &mut Diagnostics) {
+pub(super) fn check(arm: &Arm<'_>, found: &mut Diagnostics) {
     found.extend(arm.outline.nodes.iter().filter_map(|node| rate(arm, node)));
     // A feature that another mode lets pass is meant for that mode.
     let passes = |wanted: &Feature| {
@@ -29,7 +29,7 @@ pub(super) fn check(arm: &Controlled<'_>, found: &mut Diagnostics) {
 }
 
 /// Returns the warning about a turning rate that something reads, where nothing says how the sensor moves along the line.
-fn rate(arm: &Controlled<'_>, node: &OutlinedBlock) -> Option<Diagnostic> {
+fn rate(arm: &Arm<'_>, node: &OutlinedBlock) -> Option<Diagnostic> {
     if node.kind.text != "curvature" || source(node, "twist").is_some() {
         return None;
     }
@@ -43,7 +43,7 @@ fn rate(arm: &Controlled<'_>, node: &OutlinedBlock) -> Option<Diagnostic> {
 }
 
 /// Returns the flag that keeps a feature from moving the sensor in a mode, and why.
-fn barred<'f>(arm: &Controlled<'_>, mode: &ModeLaw<'_>, feature: &'f Feature) -> Option<(&'f str, String)> {
+fn barred<'f>(arm: &Arm<'_>, mode: &ModeLaw<'_>, feature: &'f Feature) -> Option<(&'f str, String)> {
     feature.gates.iter().find_map(|gate| match mode.nodes.is_set(gate) {
         Some(true) => None,
         Some(false) => Some((&**gate, "which is set in another mode only".to_owned())),
@@ -53,12 +53,12 @@ fn barred<'f>(arm: &Controlled<'_>, mode: &ModeLaw<'_>, feature: &'f Feature) ->
 }
 
 /// Returns why a comparison never sets its flag: it needs a larger force than a limit allows.
-fn out_of_reach(arm: &Controlled<'_>, mode: &ModeLaw<'_>, flag: &str) -> Option<String> {
+fn out_of_reach(arm: &Arm<'_>, mode: &ModeLaw<'_>, flag: &str) -> Option<String> {
     let node = mode.nodes.writer(flag).filter(|node| node.kind.text == "compare")?;
     let above = mode.nodes.number(node, "above")?;
     let port = way(&mode.nodes, source(node, "value")?).measured;
     let quantity = mode.quantity_of(&port)?;
-    let (limit, key) = force_limit(arm, mode, quantity)?;
+    let (limit, key) = arm.force_limit(mode, quantity)?;
     (above >= limit).then(|| format!("which is set above {above}, where the limit `{key}` is {limit}"))
 }
 

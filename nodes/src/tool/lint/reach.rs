@@ -1,19 +1,15 @@
 //! What a mode asks for or waits for and never gets: it lies beyond a limit, below a threshold, beside a window, or within a
 //! deadband.
 
-use std::f64::consts::FRAC_PI_2;
-
-use tactflow_runtime::graph::OutlinedBlock;
 use tactflow_runtime::source::{Code, Diagnostic, Diagnostics, Value};
 
-use super::modes::upstream;
-use super::{Controlled, ModeLaw};
+use super::arm::Arm;
+use super::mode_law::ModeLaw;
 use crate::tool::control::digits::to_two_digits;
-use crate::tool::control::filters::way;
 use crate::tool::control::law::Feature;
 use crate::tool::control::settings::source;
 
-pub(super) fn check(arm: &Controlled<'_>, found: &mut Diagnostics) {
+pub(super) fn check(arm: &Arm<'_>, found: &mut Diagnostics) {
     for mode in &arm.modes {
         found.extend(mode.moving().filter_map(|feature| setpoint(arm, mode, feature)));
         found.extend(mode.moving().filter_map(|feature| always_resting(arm, mode, feature)));
@@ -24,7 +20,7 @@ pub(super) fn check(arm: &Controlled<'_>, found: &mut Diagnostics) {
 }
 
 /// Returns the warnings about exits that wait for a larger force than a limit allows.
-fn exit_bounds(arm: &Controlled<'_>, mode: &ModeLaw<'_>) -> Diagnostics {
+fn exit_bounds(arm: &Arm<'_>, mode: &ModeLaw<'_>) -> Diagnostics {
     let exits = ["go", "done"].into_iter().flat_map(|kind| mode.tables(kind));
     let never = exits.filter_map(|exit| {
         let table = exit.as_table()?;
@@ -33,8 +29,8 @@ fn exit_bounds(arm: &Controlled<'_>, mode: &ModeLaw<'_>) -> Diagnostics {
         if table.get("to").and_then(Value::as_str).is_some_and(|to| leaves(arm, to)) {
             return None;
         }
-        let quantity = watched(arm, mode, when)?;
-        let (limit, key) = force_limit(arm, mode, &quantity)?;
+        let quantity = arm.watched(mode, when)?;
+        let (limit, key) = arm.force_limit(mode, &quantity)?;
         let bound = above.read::<f64>().filter(|bound| *bound >= limit)?;
         let message = format!(
             "an exit of mode `{}` waits for `{when}` above {bound}, but the limit `{key}` is {limit}: the sensor never presses \
@@ -47,27 +43,15 @@ fn exit_bounds(arm: &Controlled<'_>, mode: &ModeLaw<'_>) -> Diagnostics {
     never.collect()
 }
 
-/// Returns what an exit watches, through filters, or by the name that a part gives it.
-pub(super) fn watched(arm: &Controlled<'_>, mode: &ModeLaw<'_>, when: &str) -> Option<String> {
-    let measured = way(&mode.nodes, when).measured;
-    if let Some(quantity) = mode.quantity_of(&measured) {
-        return Some(quantity.to_owned());
-    }
-    let (part, name) = when.rsplit_once('.')?;
-    let ports = arm.outline.nodes.iter().flat_map(|node| &node.outputs);
-    let mut inside = ports.filter(|port| port.name.strip_prefix(part).is_some_and(|rest| rest.starts_with('.')));
-    inside.any(|port| mode.quantity_of(&port.name) == Some(name)).then(|| name.to_owned())
-}
-
 /// Parameters of nodes that need a force, by their type.
 const LEAST_FORCES: [(&str, &str); 2] = [("label", "min_force"), ("friction_margin", "least_force")];
 
 /// Returns the warnings about nodes that need a larger force than a limit allows.
-fn thresholds(arm: &Controlled<'_>, mode: &ModeLaw<'_>) -> Diagnostics {
-    let nodes = upstream(mode, &arm.twist);
+fn thresholds(arm: &Arm<'_>, mode: &ModeLaw<'_>) -> Diagnostics {
+    let nodes = mode.nodes.upstream(&arm.twist);
     let never = nodes.into_iter().filter_map(|node| {
         let (_, key) = LEAST_FORCES.into_iter().find(|(kind, _)| node.kind.text == *kind)?;
-        let (limit, limit_key) = force_limit(arm, mode, "force").filter(|(_, key)| key.ends_with("_n"))?;
+        let (limit, limit_key) = arm.force_limit(mode, "force").filter(|(_, key)| key.ends_with("_n"))?;
         let least = mode.nodes.number(node, key).filter(|least| *least >= limit)?;
         let message = format!(
             "`{}` needs {least} N, but the limit `{limit_key}` is {limit}: the sensor never presses that hard",
@@ -79,28 +63,12 @@ fn thresholds(arm: &Controlled<'_>, mode: &ModeLaw<'_>) -> Diagnostics {
     never.collect()
 }
 
-/// Returns the smallest limit of a force, and its key.
-pub(super) fn force_limit(arm: &Controlled<'_>, mode: &ModeLaw<'_>, quantity: &str) -> Option<(f64, String)> {
-    let limit = match quantity {
-        "pressure" => "peak",
-        "force" => "force",
-        _ => return None,
-    };
-    let limiters = arm.limits.iter().filter(|limiter| limiter.kind.ends_with("contact_limit"));
-    let limits = limiters.filter_map(|limiter| {
-        let node = mode.nodes.node(&limiter.node)?;
-        let keys = [format!("{limit}_n"), format!("{limit}_raw")];
-        keys.into_iter().find_map(|key| Some((mode.nodes.number(node, &key)?, key)))
-    });
-    limits.min_by(|(one, _), (other, _)| one.total_cmp(other))
-}
-
 /// Returns the warning about a setpoint of a force that the task never reaches: above a limit, or below what the pad
 /// feels.
-pub(super) fn setpoint(arm: &Controlled<'_>, mode: &ModeLaw<'_>, feature: &Feature) -> Option<Diagnostic> {
+pub(super) fn setpoint(arm: &Arm<'_>, mode: &ModeLaw<'_>, feature: &Feature) -> Option<Diagnostic> {
     let (quantity, setpoint) = (mode.quantity(feature)?, feature.setpoint?);
     let name = &feature.name;
-    let (message, help) = match (force_limit(arm, mode, quantity)?, least_felt(mode, feature)) {
+    let (message, help) = match (arm.force_limit(mode, quantity)?, least_felt(mode, feature)) {
         ((most, key), _) if setpoint >= most => {
             let why = if quantity == "pressure" { "one tactel" } else { "the whole pad" };
             (
@@ -124,11 +92,11 @@ pub(super) fn setpoint(arm: &Controlled<'_>, mode: &ModeLaw<'_>, feature: &Featu
 }
 
 /// Returns the warning about a deadband in which a feature always rests, or for good once the contact is lost.
-fn always_resting(arm: &Controlled<'_>, mode: &ModeLaw<'_>, feature: &Feature) -> Option<Diagnostic> {
-    let band = deadband(mode, feature)?;
+fn always_resting(arm: &Arm<'_>, mode: &ModeLaw<'_>, feature: &Feature) -> Option<Diagnostic> {
+    let band = mode.deadband(feature)?;
     let (name, path) = (&feature.name, format!("width.{}.outer", feature.name));
     let outer = mode.nodes.number(band, &path)?;
-    let largest = largest_error(arm, mode, feature);
+    let largest = arm.largest_error(mode, feature);
     let why = match mode.quantity(feature)? {
         "pressure" | "force" if feature.setpoint == Some(largest) => {
             format!("without a contact its error is {largest}, so once it rests it presses no more")
@@ -144,23 +112,10 @@ fn always_resting(arm: &Controlled<'_>, mode: &ModeLaw<'_>, feature: &Feature) -
     Some(Diagnostic::new(Code::UnreachableSetpoint, mode.place(&band.name, &path), message).help(help))
 }
 
-/// Returns the largest error that a feature can have, as far as it is known.
-pub(super) fn largest_error(arm: &Controlled<'_>, mode: &ModeLaw<'_>, feature: &Feature) -> f64 {
-    match mode.quantity(feature) {
-        Some("orientation") => FRAC_PI_2,
-        Some(quantity @ ("pressure" | "force")) => {
-            // At the first touch it is the setpoint.
-            let most = force_limit(arm, mode, quantity).map_or(f64::INFINITY, |(most, _)| most);
-            feature.setpoint.filter(|setpoint| *setpoint > 0.0).map_or(most, |setpoint| most.min(setpoint))
-        }
-        _ => mode.farthest(feature).unwrap_or(f64::INFINITY),
-    }
-}
-
 /// Returns the warning about a place outside of the window in which it is measured.
 fn beside_window(mode: &ModeLaw<'_>, feature: &Feature) -> Option<Diagnostic> {
     let axis = ["x", "y"].iter().position(|axis| mode.quantity(feature) == Some(axis))?;
-    let windows = upstream(mode, feature.measured.as_deref()?);
+    let windows = mode.nodes.upstream(feature.measured.as_deref()?);
     let window = windows.into_iter().find(|node| node.kind.text == "image_window")?;
     // A window that follows a point goes with the contact.
     if source(window, "x").is_some() || source(window, "y").is_some() {
@@ -179,25 +134,19 @@ fn beside_window(mode: &ModeLaw<'_>, feature: &Feature) -> Option<Diagnostic> {
     Some(Diagnostic::new(Code::UnreachableSetpoint, place, message).help(help))
 }
 
-/// Returns the node that lets a feature rest while its error is small.
-pub(super) fn deadband<'a>(mode: &ModeLaw<'a>, feature: &Feature) -> Option<&'a OutlinedBlock> {
-    let pid = mode.nodes.node(feature.pid.as_deref()?)?;
-    mode.nodes.writer(source(pid, "error")?).filter(|node| node.kind.text == "deadband")
-}
-
 /// Returns whether a mode is meant to end without a contact: an exit waits for that, or the sensor moves away after it.
-fn lets_go(arm: &Controlled<'_>, mode: &ModeLaw<'_>) -> bool {
+fn lets_go(arm: &Arm<'_>, mode: &ModeLaw<'_>) -> bool {
     mode.releases().next().is_some() || mode.lost().any(|exit| leaves(arm, exit.to))
 }
 
 /// Returns whether the sensor moves away from the object in a mode.
-fn leaves(arm: &Controlled<'_>, mode: &str) -> bool {
-    arm.modes.iter().any(|other| other.own_name() == mode && other.backs_off())
+fn leaves(arm: &Arm<'_>, mode: &str) -> bool {
+    arm.mode(mode).is_some_and(ModeLaw::backs_off)
 }
 
 /// Returns the smallest value of a tactel that a feature counts, and the node that drops smaller ones.
 fn least_felt<'a>(mode: &ModeLaw<'a>, feature: &Feature) -> Option<(f64, &'a str)> {
-    let nodes = upstream(mode, feature.measured.as_deref()?);
+    let nodes = mode.nodes.upstream(feature.measured.as_deref()?);
     let node = nodes.into_iter().find(|node| node.kind.text == "binarize")?;
     let value = |key: &str| mode.nodes.number(node, key);
     Some((value("release").or_else(|| value("threshold"))?, &node.name))

@@ -6,7 +6,8 @@ use std::ops::Range;
 
 use tactflow_runtime::source::{Code, Diagnostic, Diagnostics, Edit};
 
-use super::{Controlled, ModeLaw};
+use super::arm::Arm;
+use super::mode_law::ModeLaw;
 use crate::tool::control::choose::{Wanted, factor};
 use crate::tool::control::contacts::Contact;
 use crate::tool::control::digits::{down_to_two_digits, to_two_digits};
@@ -38,7 +39,7 @@ struct Found<'a> {
     lag: f64,
 }
 
-pub(super) fn check(arm: &Controlled<'_>, found: &mut Diagnostics) {
+pub(super) fn check(arm: &Arm<'_>, found: &mut Diagnostics) {
     let geometry = [Contact { object: String::new(), latency_ms: 0.0, features: BTreeMap::new() }];
     let contacts = if arm.contacts.is_empty() { &geometry[..] } else { &arm.contacts[..] };
     // Most modes have the same loops.

@@ -5,7 +5,7 @@ use std::ops::Range;
 use tactflow_runtime::graph::{NO_SPAN, Outline};
 use tactflow_runtime::source::{Code, Diagnostic, Diagnostics, Edit, Item, Value, suggest_name};
 
-use super::Controlled;
+use super::arm::Arm;
 use crate::tool::control::contacts::{Contact, contacts};
 use crate::tool::control::law::Feature;
 
@@ -21,7 +21,7 @@ pub(super) fn check(outline: &Outline, facts: &[(String, toml::Value)], arm: &st
 
 /// Returns the warnings about features that the contacts of an arm call otherwise than their ports are called: as the
 /// graph calls them, or misspelt.
-pub(super) fn misnamed(outline: &Outline, arm: &Controlled<'_>, name: &str) -> Diagnostics {
+pub(super) fn misnamed(outline: &Outline, arm: &Arm<'_>, name: &str) -> Diagnostics {
     let Some((_, value)) = outline.facts.iter().find(|(fact, _)| *fact == format!("{name}.contacts")) else {
         return Diagnostics::new();
     };
