@@ -10,6 +10,7 @@ pub(super) mod choose;
 pub(super) mod collect;
 pub(super) mod contacts;
 pub(super) mod digits;
+pub(super) mod exits;
 pub(super) mod filters;
 pub(super) mod law;
 pub(super) mod margins;

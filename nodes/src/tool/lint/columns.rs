@@ -15,6 +15,7 @@ use crate::motion::axis::wrap_axial;
 use crate::tool::control::collect::law;
 use crate::tool::control::contacts::Contact;
 use crate::tool::control::digits::to_three_digits;
+use crate::tool::control::exits::Exit;
 use crate::tool::control::law::{Feature, Law};
 use crate::tool::control::settings::{Nodes, source};
 
@@ -382,8 +383,8 @@ fn is_watched(arm: &Arm<'_>, feature: &Feature) -> bool {
     let Some(error) = feature.compared.as_ref().map(|node| format!("{node}.error.{}", feature.name)) else {
         return false;
     };
-    let exits = arm.modes.iter().flat_map(|mode| ["go", "done"].into_iter().flat_map(|kind| mode.tables(kind)));
-    exits.filter_map(|exit| exit.as_table()?.get("when")?.as_str()).any(|port| error.ends_with(port))
+    let exits = arm.modes.iter().flat_map(ModeLaw::conditions);
+    exits.filter_map(Exit::when).any(|port| error.ends_with(port))
 }
 
 /// Returns whether a feature is the position along a line whose direction the task controls. Such a position has no

@@ -135,7 +135,7 @@ fn left_at(arm: &Arm<'_>, mode: &ModeLaw<'_>, feature: &Feature) -> Option<f64> 
         features.any(|one| one.id() == feature.id() && one.ki == 0.0)
     };
     let is_own = |port: &str| port == error || error.ends_with(&format!(".{port}"));
-    let exits = mode.exits("go").filter(|exit| exit.word("when").is_some_and(is_own) && rests(exit.to));
+    let exits = mode.exits("go").filter(|exit| exit.when().is_some_and(is_own) && exit.to().is_some_and(rests));
     let exits: Vec<_> = exits.collect();
     let above = exits.iter().find_map(|exit| exit.number("above"))?;
     let below = exits.iter().find_map(|exit| exit.number("below"));

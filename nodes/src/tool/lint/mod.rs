@@ -9,7 +9,7 @@
 //! |---|---|
 //! | what moves an arm, and how far may it press? | `arm` |
 //! | what moves it in one mode, and where is that written? | `mode_law` |
-//! | where does a mode lead, and what does it wait for? | `exits` |
+//! | which exits of a mode wait for what? | `exits` |
 //! | how does a feature answer a motion, by geometry? | `rows` |
 //! | can the contacts of the bench be read? | `unread` |
 //! | does a mode roll without a force, or wait without a motion? | `modes` |

@@ -1,12 +1,12 @@
 //! Motions that work against each other in one mode, and motions into an object that is already pressed.
 
-use tactflow_runtime::source::{Code, Diagnostic, Diagnostics, Item, Table, Value};
+use tactflow_runtime::source::{Code, Diagnostic, Diagnostics, Item, Table};
 
 use super::arm::Arm;
-use super::exits::Exit;
 use super::mode_law::ModeLaw;
 use super::modes::GUIDES;
 use crate::motion::COMPONENTS;
+use crate::tool::control::exits::Exit;
 use crate::tool::control::law::{Feature, Guidance};
 use crate::tool::control::settings::source;
 
@@ -99,7 +99,7 @@ fn push(arm: &Arm<'_>, mode: &ModeLaw<'_>) -> Option<Diagnostic> {
     if speed <= 0.0 || controls(mode) || feels || mode.law.guidance.iter().any(presses) {
         return None;
     }
-    let leads = |exit: Exit<'_>| exit.to == mode.own_name() && !exit.is_lost();
+    let leads = |exit: Exit<'_>| exit.to() == Some(mode.own_name()) && !exit.is_lost();
     let before = |other: &&ModeLaw<'_>| controls(other) && other.exits("go").any(leads);
     let before = arm.modes.iter().find(before)?;
     let constant = mode.law.constants.iter().find(|constant| constant.twist[2] > 0.0)?;
@@ -155,15 +155,12 @@ fn pressed(arm: &Arm<'_>, mode: &ModeLaw<'_>) -> Option<Diagnostic> {
 
 /// Returns whether an exit waits for a force.
 fn waits_for_force(arm: &Arm<'_>, mode: &ModeLaw<'_>) -> bool {
-    let exits = ["go", "done"].into_iter().flat_map(|kind| mode.tables(kind)).filter_map(Value::as_table);
     let is_force = |when: &str| {
         let quantity = arm.watched(mode, when);
         matches!(quantity.as_deref().or(when.rsplit('.').next()), Some("pressure" | "force"))
     };
-    exits
-        .filter(|exit| exit.get("above").is_some() || exit.get("within").is_some())
-        .filter_map(|exit| exit.get("when")?.as_str())
-        .any(is_force)
+    let is_bound = |exit: &Exit<'_>| exit.entry("above").is_some() || exit.entry("within").is_some();
+    mode.conditions().filter(is_bound).filter_map(Exit::when).any(is_force)
 }
 
 /// Distance from its setpoint at which a constant motion may hold a contact [m].

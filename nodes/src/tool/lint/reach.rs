@@ -1,11 +1,12 @@
 //! What a mode asks for or waits for and never gets: it lies beyond a limit, below a threshold, beside a window, or within a
 //! deadband.
 
-use tactflow_runtime::source::{Code, Diagnostic, Diagnostics, Value};
+use tactflow_runtime::source::{Code, Diagnostic, Diagnostics};
 
 use super::arm::Arm;
 use super::mode_law::ModeLaw;
 use crate::tool::control::digits::to_two_digits;
+use crate::tool::control::exits::Exit;
 use crate::tool::control::law::Feature;
 use crate::tool::control::settings::source;
 
@@ -21,12 +22,10 @@ pub(super) fn check(arm: &Arm<'_>, found: &mut Diagnostics) {
 
 /// Returns the warnings about exits that wait for a larger force than a limit allows.
 fn exit_bounds(arm: &Arm<'_>, mode: &ModeLaw<'_>) -> Diagnostics {
-    let exits = ["go", "done"].into_iter().flat_map(|kind| mode.tables(kind));
-    let never = exits.filter_map(|exit| {
-        let table = exit.as_table()?;
-        let (when, above) = (table.get("when")?.as_str()?, table.get("above")?);
+    let never = mode.conditions().filter_map(|exit| {
+        let (when, above) = (exit.when()?, exit.entry("above")?);
         // Only something that pushes the pad gives more, and then the sensor is right to leave.
-        if table.get("to").and_then(Value::as_str).is_some_and(|to| leaves(arm, to)) {
+        if exit.to().is_some_and(|to| leaves(arm, to)) {
             return None;
         }
         let quantity = arm.watched(mode, when)?;
@@ -136,7 +135,7 @@ fn beside_window(mode: &ModeLaw<'_>, feature: &Feature) -> Option<Diagnostic> {
 
 /// Returns whether a mode is meant to end without a contact: an exit waits for that, or the sensor moves away after it.
 fn lets_go(arm: &Arm<'_>, mode: &ModeLaw<'_>) -> bool {
-    mode.releases().next().is_some() || mode.lost().any(|exit| leaves(arm, exit.to))
+    mode.releases().next().is_some() || mode.lost().filter_map(Exit::to).any(|to| leaves(arm, to))
 }
 
 /// Returns whether the sensor moves away from the object in a mode.

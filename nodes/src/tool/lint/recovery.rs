@@ -5,8 +5,8 @@ use std::collections::BTreeSet;
 use tactflow_runtime::source::{Code, Diagnostic, Diagnostics};
 
 use super::arm::Arm;
-use super::exits::Exit;
 use super::mode_law::ModeLaw;
+use crate::tool::control::exits::Exit;
 
 /// Share of a speed along the object that counts as one toward it [1].
 const BESIDE: f64 = 0.5;
@@ -28,13 +28,14 @@ pub(super) fn check(arm: &Arm<'_>, found: &mut Diagnostics) {
     let first_speed = fastest(arm, &first, |mode| mode.approach()).filter(|(_, speed)| *speed > 0.0);
     let Some((slow, first_speed)) = first_speed else { return };
     for mode in &arm.modes {
-        found.extend(mode.lost().filter(|exit| !first.contains(exit.to)).filter_map(|exit| {
-            let search = search(arm, exit.to, &first);
+        let exits = mode.lost().filter_map(|exit| Some((exit, exit.to()?)));
+        found.extend(exits.filter(|(_, to)| !first.contains(to)).filter_map(|(exit, to)| {
+            let search = search(arm, to, &first);
             // A task that backs off first approaches again from a distance.
             let backs_off = search.iter().filter_map(|name| arm.mode(name)).any(ModeLaw::backs_off);
             let (fast, again) = fastest(arm, &search, |mode| mode.search_speed()).filter(|_| !backs_off)?;
             let is_beside = arm.mode(fast)?.approach() < again;
-            (again > first_speed * (1.0 + 1e-9)).then(|| report(&exit, (fast, again, is_beside), (slow, first_speed)))
+            (again > first_speed * (1.0 + 1e-9)).then(|| report(exit, (fast, again, is_beside), (slow, first_speed)))
         }));
     }
 }
@@ -48,7 +49,7 @@ fn search<'a>(arm: &'a Arm<'_>, from: &'a str, known: &BTreeSet<&str>) -> BTreeS
         // The first mode begins without one, even if it notices a lost contact itself.
         let has_contact = mode.lost().next().is_some() && name != from;
         if !has_contact && !known.contains(name) && found.insert(name) {
-            open.extend(mode.exits("go").filter(|exit| !exit.is_found()).map(|exit| exit.to));
+            open.extend(mode.exits("go").filter(|exit| !exit.is_found()).filter_map(Exit::to));
         }
     }
     found
@@ -64,7 +65,7 @@ fn fastest<'a>(
     speeds.max_by(|(_, one), (_, other)| one.total_cmp(other))
 }
 
-fn report(exit: &Exit<'_>, (fast, again, is_beside): (&str, f64, bool), (slow, first): (&str, f64)) -> Diagnostic {
+fn report(exit: Exit<'_>, (fast, again, is_beside): (&str, f64, bool), (slow, first): (&str, f64)) -> Diagnostic {
     let (way, again, most, axis) = match is_beside {
         true => ("sweeps along the object", again / BESIDE, first / BESIDE, "x and y"),
         false => ("moves toward the object", again, first, "+z"),
@@ -76,6 +77,6 @@ fn report(exit: &Exit<'_>, (fast, again, is_beside): (&str, f64, bool), (slow, f
     let help = format!(
         "let `{fast}` move with {most} m/s or less along {axis}: the object is near, and a fast touch presses hard"
     );
-    let to = exit.value.as_table().and_then(|table| table.get("to"));
-    Diagnostic::new(Code::FastRecovery, to.unwrap_or(exit.value).span.clone(), message).help(help)
+    let place = exit.entry("to").unwrap_or(exit.value).span.clone();
+    Diagnostic::new(Code::FastRecovery, place, message).help(help)
 }

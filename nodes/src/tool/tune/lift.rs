@@ -2,8 +2,9 @@
 
 use std::collections::BTreeSet;
 
-use serde_json::Value;
 use tactflow_runtime::graph::{Outline, OutlinedMode};
+
+use crate::tool::control::exits::{Exit, exits};
 
 /// The mode in which the sensor lifts off.
 pub(super) const MODE: &str = "tune_lift";
@@ -42,11 +43,8 @@ pub(super) fn after(to: &str, after_s: f64) -> String {
 }
 
 /// Returns the modes to which the exits `go` of a mode lead.
-fn targets(mode: &OutlinedMode) -> BTreeSet<String> {
-    let exits = mode.settings.iter().filter(|setting| setting.path == "go");
-    let exits = exits.filter_map(|setting| serde_json::to_value(&setting.value).ok());
-    let exits = exits.flat_map(|exits| if let Value::Array(exits) = exits { exits } else { vec![exits] });
-    exits.filter_map(|exit| exit["to"].as_str().map(str::to_owned)).collect()
+fn targets(mode: &OutlinedMode) -> BTreeSet<&str> {
+    exits(mode, "go").filter_map(Exit::to).collect()
 }
 
 #[cfg(test)]

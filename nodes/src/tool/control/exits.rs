@@ -1,0 +1,61 @@
+//! The exits of a mode: where they lead, and what they wait for.
+
+use tactflow_runtime::graph::OutlinedMode;
+use tactflow_runtime::source::{Item, Value};
+
+/// An exit of a mode.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Exit<'a> {
+    /// Its table.
+    pub(crate) value: &'a Value,
+}
+
+/// Returns the exits of a mode under a key, such as `go` or `done`: one table, or a list of them.
+pub(crate) fn exits<'a>(mode: &'a OutlinedMode, key: &'static str) -> impl Iterator<Item = Exit<'a>> {
+    let settings = mode.settings.iter().filter(move |setting| setting.path == key);
+    let values = settings.flat_map(|setting| match &setting.value.item {
+        Item::Array(exits) => exits.iter().collect(),
+        _ => vec![&setting.value],
+    });
+    values.map(|value| Exit { value })
+}
+
+impl<'a> Exit<'a> {
+    /// Returns the mode to which it leads; `None` for an exit that ends the task.
+    pub(crate) fn to(self) -> Option<&'a str> {
+        self.word("to")
+    }
+
+    /// Returns the port for whose value it waits.
+    pub(crate) fn when(self) -> Option<&'a str> {
+        self.word("when")
+    }
+
+    /// Returns one of its entries.
+    pub(crate) fn entry(self, key: &str) -> Option<&'a Value> {
+        self.value.as_table()?.get(key)
+    }
+
+    /// Returns one of its entries, if that is a number.
+    pub(crate) fn number(self, key: &str) -> Option<f64> {
+        self.entry(key)?.read()
+    }
+
+    /// Returns whether it waits until there is no contact.
+    pub(crate) fn is_lost(self) -> bool {
+        self.is_of_contact() && matches!(self.word("is"), Some("false" | "absent"))
+    }
+
+    /// Returns whether it waits for a contact.
+    pub(crate) fn is_found(self) -> bool {
+        self.is_of_contact() && !self.is_lost()
+    }
+
+    fn is_of_contact(self) -> bool {
+        self.when().is_some_and(|port| port.ends_with(".present"))
+    }
+
+    fn word(self, key: &str) -> Option<&'a str> {
+        self.entry(key)?.as_str()
+    }
+}
