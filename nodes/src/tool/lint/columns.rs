@@ -7,9 +7,9 @@ use tactflow_runtime::graph::OutlinedBlock;
 use tactflow_runtime::source::{Code, Diagnostic, Diagnostics, Edit, Item};
 
 use super::arm::Arm;
+use super::geometry::{Confusion, Geometry, KnownSign};
 use super::lines::{line_angle, line_axis};
 use super::mode_law::ModeLaw;
-use super::rows::{Answer, Row};
 use crate::motion::COMPONENTS;
 use crate::motion::axis::wrap_axial;
 use crate::tool::control::collect::law;
@@ -32,7 +32,8 @@ pub(super) fn check(arm: &Arm<'_>, found: &mut Diagnostics) {
 
 /// Returns the warning about a column that increases the error of its feature, or that does not change the feature.
 fn wrong(arm: &Arm<'_>, mode: &ModeLaw<'_>, feature: &Feature) -> Option<Diagnostic> {
-    let Some((quantity, row)) = mode.quantity(feature).and_then(|quantity| Some((quantity, Row::of(quantity)?))) else {
+    let Some((quantity, row)) = mode.quantity(feature).and_then(|quantity| Some((quantity, Geometry::of(quantity)?)))
+    else {
         return reversed(arm, mode, feature).or_else(|| offset(arm, mode, feature));
     };
     let column = written(mode, feature)?;
@@ -45,13 +46,11 @@ fn wrong(arm: &Arm<'_>, mode: &ModeLaw<'_>, feature: &Feature) -> Option<Diagnos
     if let Some(aside) = aside(arm, mode, feature, (quantity, column)) {
         return Some(aside);
     }
-    let is_reversed = |answer: &&Answer| {
+    let is_reversed = |known: &&KnownSign| {
         // What the bench says about this object counts more than geometry.
         let said = arm.contacts.iter().filter_map(|contact| contact.features.get(quantity));
-        let is_said = said.map(|answer| answer.row()).any(|row| row[answer.component] * answer.sign < 0.0);
-        feature.column[answer.component] * answer.sign < 0.0
-            && !is_said
-            && !is_outweighed(&row, &feature.column, answer)
+        let is_said = said.map(|answer| answer.row()).any(|row| row[known.component] * known.sign < 0.0);
+        feature.column[known.component] * known.sign < 0.0 && !is_said && !is_outweighed(&row, &feature.column, known)
     };
     let Some(first) = row.known.iter().find(is_reversed) else { return reversed(arm, mode, feature) };
     let name = COMPONENTS[first.component];
@@ -76,16 +75,6 @@ fn behind(feature: &Feature) -> String {
     feature.mount.as_ref().map(|turner| format!("behind `{turner}`, ")).unwrap_or_default()
 }
 
-/// Returns the components that change a quantity, each with one that changes another quantity.
-fn pairs(quantity: &str) -> &'static [[usize; 2]] {
-    match quantity {
-        "x" => &[[0, 1], [4, 3]],
-        "y" => &[[1, 0], [3, 4]],
-        "pressure" | "force" => &[[2, 0], [2, 1]],
-        _ => &[],
-    }
-}
-
 /// Returns the warning about a column that slides or rolls a contact more along the other axis than along its own, or that
 /// slides it more than it presses. With two such columns the contact circles around its setpoint, or runs away from it.
 fn aside(
@@ -95,19 +84,19 @@ fn aside(
     (quantity, column): (&str, [f64; 6]),
 ) -> Option<Diagnostic> {
     let name = &feature.name;
-    let pairs = pairs(quantity);
+    let geometry = Geometry::of(quantity)?;
     let answers = || arm.contacts.iter().filter_map(|contact| contact.features.get(quantity));
-    let is_aside = |[own, other]: &&[usize; 2]| {
+    let is_aside = |Confusion { own, other }: &&Confusion| {
         // A bench that states an answer to the other component knows more.
         let is_stated = answers().any(|answer| answer.row()[*other] != 0.0);
         !is_stated && feature.column[*other].abs() > feature.column[*own].abs()
     };
-    let [own, other] = *pairs.iter().find(is_aside)?;
+    let Confusion { own, other } = *geometry.confused.iter().find(is_aside)?;
     let mut right = column;
-    for [own, other] in pairs {
-        let known = Row::of(quantity)?.known.iter().find(|answer| answer.component == *own)?;
+    for Confusion { own, other } in geometry.confused {
+        let sign = geometry.sign(*own)?;
         let size = if *own == 2 { column[*own].abs() } else { column[*own].hypot(column[*other]) };
-        (right[*own], right[*other]) = (known.sign * to_three_digits(size), 0.0);
+        (right[*own], right[*other]) = (sign * to_three_digits(size), 0.0);
     }
     let message = format!(
         "the column of `{name}` moves the sensor more with `{}`, which does not change `{quantity}`, than with `{}`, which does",
@@ -155,12 +144,12 @@ fn offset(arm: &Arm<'_>, mode: &ModeLaw<'_>, feature: &Feature) -> Option<Diagno
 }
 
 /// Returns whether a column rolls the sensor the wrong way, but less than it slides the right way on any object.
-fn is_outweighed(row: &Row, column: &[f64; 6], answer: &Answer) -> bool {
-    let rolls = answer.component > 2;
+fn is_outweighed(row: &Geometry, column: &[f64; 6], known: &KnownSign) -> bool {
+    let rolls = known.component > 2;
     let slides = row.known.iter().filter(|other| other.component < 3);
     rolls
         && slides.map(|other| column[other.component] * other.sign).sum::<f64>()
-            > column[answer.component].abs() * LARGEST_RADIUS
+            > column[known.component].abs() * LARGEST_RADIUS
 }
 
 /// Returns the warning about a column that increases the error of a feature of which only the bench says how it answers.
@@ -177,7 +166,7 @@ fn reversed(arm: &Arm<'_>, mode: &ModeLaw<'_>, feature: &Feature) -> Option<Diag
 }
 
 /// Returns the warning about a column of which the projectors leave only what does not change the feature.
-fn blocked(mode: &ModeLaw<'_>, feature: &Feature, row: &Row) -> Diagnostic {
+fn blocked(mode: &ModeLaw<'_>, feature: &Feature, row: &Geometry) -> Diagnostic {
     let name = &feature.name;
     let message = format!(
         "{}the projector leaves only {} of the column of `{name}`, which does not change `{name}` in a known direction",
@@ -200,11 +189,11 @@ fn moved(column: &[f64; 6]) -> String {
 /// Returns the warning about a column that does not change its feature.
 fn foreign(mode: &ModeLaw<'_>, feature: &Feature, quantity: &str, column: [f64; 6]) -> Option<Diagnostic> {
     let moved = moved(&feature.column);
-    let row = Row::of(quantity)?;
+    let row = Geometry::of(quantity)?;
     // The feature whose column changes this one, and that this column changes.
     let other = mode.law.features.iter().find_map(|other| {
         let other_column = written(mode, other)?;
-        let other_row = Row::of(mode.quantity(other)?)?;
+        let other_row = Geometry::of(mode.quantity(other)?)?;
         let is_exchanged =
             row.changes(&other_column) && other_row.changes(&column) && !other_row.changes(&other_column);
         is_exchanged.then_some((other, other_column))
@@ -217,7 +206,7 @@ fn foreign(mode: &ModeLaw<'_>, feature: &Feature, quantity: &str, column: [f64; 
         );
         // The second one of the pair would say the same.
         let is_second = mode.place_of_column(other).start < mode.place_of_column(feature).start;
-        let (own, others) = (row.signed(other_column), Row::of(mode.quantity(other)?)?.signed(column));
+        let (own, others) = (row.signed(other_column), Geometry::of(mode.quantity(other)?)?.signed(column));
         let diagnostic = replaced(mode, feature, message, own);
         let place = mode.place_of_column(other);
         let is_shown = other.moves();
@@ -340,7 +329,7 @@ fn unused(arm: &Arm<'_>) -> Diagnostics {
     let found = dead.filter_map(|feature| {
         let column = first.column(feature)?;
         // Of the components of the column, those that change the feature.
-        let row = first.quantity(feature).and_then(Row::of).filter(|row| row.changes(&column));
+        let row = first.quantity(feature).and_then(Geometry::of).filter(|row| row.changes(&column));
         let answers = row.map(|row| row.components(" or "));
         let (message, help) = match column == [0.0; 6] {
             true => (

@@ -3,6 +3,7 @@
 use tactflow_runtime::source::{Code, Diagnostic, Diagnostics, Edit};
 
 use super::arm::Arm;
+use super::geometry::is_force;
 use super::mode_law::ModeLaw;
 use super::reach::setpoint;
 use crate::tool::control::contacts::Answer;
@@ -140,7 +141,7 @@ fn left_at(arm: &Arm<'_>, mode: &ModeLaw<'_>, feature: &Feature) -> Option<f64> 
     let above = exits.iter().find_map(|exit| exit.number("above"))?;
     let below = exits.iter().find_map(|exit| exit.number("below"));
     match mode.quantity(feature) {
-        Some("pressure" | "force") => Some(above),
+        Some(quantity) if is_force(quantity) => Some(above),
         _ => below.map(|below| above.max(-below)),
     }
 }

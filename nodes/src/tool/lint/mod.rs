@@ -10,7 +10,7 @@
 //! | what moves an arm, and how far may it press? | `arm` |
 //! | what moves it in one mode, and where is that written? | `mode_law` |
 //! | which exits of a mode wait for what? | `exits` |
-//! | how does a feature answer a motion, by geometry? | `rows` |
+//! | how does a feature answer a motion, by geometry? | `geometry` |
 //! | can the contacts of the bench be read? | `unread` |
 //! | does a mode roll without a force, or wait without a motion? | `modes` |
 //! | is a setpoint, an exit, a deadband or a threshold out of reach? | `reach` |
@@ -26,6 +26,7 @@ mod arm;
 mod columns;
 mod exits;
 mod gains;
+mod geometry;
 mod lines;
 mod mode_law;
 mod modes;
@@ -33,7 +34,6 @@ mod opposed;
 mod presence;
 mod reach;
 mod recovery;
-mod rows;
 mod stability;
 mod unread;
 

@@ -3,6 +3,7 @@
 use tactflow_runtime::source::{Code, Diagnostic, Diagnostics, Item, Table};
 
 use super::arm::Arm;
+use super::geometry::is_force;
 use super::mode_law::ModeLaw;
 use super::modes::GUIDES;
 use crate::motion::COMPONENTS;
@@ -24,11 +25,12 @@ pub(super) fn check(arm: &Arm<'_>, found: &mut Diagnostics) {
 fn retreat(mode: &ModeLaw<'_>) -> Option<Diagnostic> {
     let (node, speed) = away(mode)?;
     let presses = |feature: &&Feature| {
-        let is_force = matches!(mode.quantity(feature), Some("pressure" | "force"));
         let least = feature.schedules.iter().map(|schedule| schedule.min).product::<f64>();
         let limit = mode.limit(feature).unwrap_or(f64::INFINITY);
         let most = feature.setpoint.map(|setpoint| (feature.kp * least * setpoint).min(limit) * feature.column[2]);
-        is_force && feature.is_open_in_contact(&mode.nodes) && most.is_some_and(|most| most > 0.0 && most >= speed)
+        mode.quantity(feature).is_some_and(is_force)
+            && feature.is_open_in_contact(&mode.nodes)
+            && most.is_some_and(|most| most > 0.0 && most >= speed)
     };
     let feature = mode.moving().find(presses)?;
     let message = format!(
@@ -129,10 +131,9 @@ fn pressed(arm: &Arm<'_>, mode: &ModeLaw<'_>) -> Option<Diagnostic> {
     let constant = open().find(|constant| constant.twist[2] > 0.0)?;
     let shift = |feature: &Feature| speed / (feature.kp * feature.column[2]);
     let is_shifted = |feature: &&Feature| {
-        let is_force = matches!(mode.quantity(feature), Some("pressure" | "force"));
         let within = mode.within(feature).filter(|_| feature.ki > 0.0);
         let is_left = feature.ki == 0.0 || within.is_some_and(|within| within < shift(feature));
-        is_force
+        mode.quantity(feature).is_some_and(is_force)
             && is_left
             && feature.kp > 0.0
             && feature.is_open_in_contact(&mode.nodes)
@@ -155,12 +156,12 @@ fn pressed(arm: &Arm<'_>, mode: &ModeLaw<'_>) -> Option<Diagnostic> {
 
 /// Returns whether an exit waits for a force.
 fn waits_for_force(arm: &Arm<'_>, mode: &ModeLaw<'_>) -> bool {
-    let is_force = |when: &str| {
+    let is_of_force = |when: &str| {
         let quantity = arm.watched(mode, when);
-        matches!(quantity.as_deref().or(when.rsplit('.').next()), Some("pressure" | "force"))
+        quantity.as_deref().or(when.rsplit('.').next()).is_some_and(is_force)
     };
     let is_bound = |exit: &Exit<'_>| exit.entry("above").is_some() || exit.entry("within").is_some();
-    mode.conditions().filter(is_bound).filter_map(Exit::when).any(is_force)
+    mode.conditions().filter(is_bound).filter_map(Exit::when).any(is_of_force)
 }
 
 /// Distance from its setpoint at which a constant motion may hold a contact [m].
@@ -211,12 +212,12 @@ fn contended(mode: &ModeLaw<'_>) -> Option<Diagnostic> {
         feature.ki > 0.0
             && feature.is_open_in_contact(&mode.nodes)
             && feature.presses_alone()
-            && matches!(mode.quantity(feature), Some("pressure" | "force"))
+            && mode.quantity(feature).is_some_and(is_force)
     };
     let all: Vec<&Feature> = mode.moving().filter(is_judged).collect();
     let differs = |one: &Feature, other: &Feature| one.measured != other.measured || one.setpoint != other.setpoint;
-    let pairs = all.windows(2).find(|pair| differs(pair[0], pair[1]));
-    let [one, other] = pairs? else { return None };
+    let differing = all.windows(2).find(|pair| differs(pair[0], pair[1]));
+    let [one, other] = differing? else { return None };
     let message = format!(
         "{}the integrals of `{}` and `{}` both move `vz`, each toward its own setpoint: they wind up against each other",
         mode.named(),
