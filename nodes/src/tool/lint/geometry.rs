@@ -70,6 +70,12 @@ pub(super) fn is_force(quantity: &str) -> bool {
     matches!(quantity, "pressure" | "force")
 }
 
+/// Returns the components that a column moves, for a message.
+pub(super) fn moved(column: &[f64; 6]) -> String {
+    let moved: Vec<String> = (0..6).filter(|i| column[*i] != 0.0).map(|i| format!("`{}`", COMPONENTS[i])).collect();
+    moved.join(" and ")
+}
+
 impl Geometry {
     /// Returns the components that change a quantity; `None` if geometry does not say.
     pub(super) fn of(quantity: &str) -> Option<Self> {

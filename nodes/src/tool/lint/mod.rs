@@ -18,15 +18,17 @@
 //! | do motions work against each other? | `opposed` |
 //! | is a lost contact searched for too fast? | `recovery` |
 //! | is a feature never present? | `presence` |
-//! | is a column wrong or unused? | `columns` |
+//! | does a column increase an error, or change another feature? | `wrong_columns` |
+//! | does a projector select what nothing moves? | `idle_axes` |
+//! | is a column used in no mode? | `unused_columns` |
 //! | does a gain do harm whatever is touched? | `gains` |
 //! | is a loop near instability over a contact? | `stability` |
 
 mod arm;
-mod columns;
 mod exits;
 mod gains;
 mod geometry;
+mod idle_axes;
 mod lines;
 mod mode_law;
 mod modes;
@@ -36,6 +38,8 @@ mod reach;
 mod recovery;
 mod stability;
 mod unread;
+mod unused_columns;
+mod wrong_columns;
 
 use std::collections::BTreeSet;
 
@@ -44,6 +48,7 @@ use tactflow_runtime::source::{Code, Diagnostics};
 
 use super::control::settings::{Index, commands};
 use arm::{Arm, carried};
+use mode_law::ModeLaw;
 
 /// Returns the warnings about the control law of a graph.
 pub(crate) fn lint(outline: &Outline, facts: &[(String, toml::Value)]) -> Diagnostics {
@@ -66,7 +71,7 @@ pub(crate) fn lint(outline: &Outline, facts: &[(String, toml::Value)]) -> Diagno
         opposed::check(&arm, &mut found);
         recovery::check(&arm, &mut found);
         presence::check(&arm, &mut found);
-        columns::check(&arm, &mut found);
+        found.extend(columns(&arm));
         gains::check(&arm, &mut found);
         stability::check(&arm, &mut found);
         let of_arm = found.split_off(before);
@@ -76,6 +81,12 @@ pub(crate) fn lint(outline: &Outline, facts: &[(String, toml::Value)]) -> Diagno
     let mut seen = BTreeSet::new();
     found.retain(|one| seen.insert((one.code, one.span.start)));
     found
+}
+
+/// Returns the warnings about columns and about what projectors select of them.
+fn columns(arm: &Arm<'_>) -> Diagnostics {
+    let of_mode = |mode: &ModeLaw<'_>| [wrong_columns::check(arm, mode), idle_axes::check(arm, mode)].concat();
+    arm.modes.iter().flat_map(of_mode).chain(unused_columns::check(arm)).collect()
 }
 
 /// Removes what another warning about the same arm causes: a task that rolls without its force has a column that nothing

@@ -1,0 +1,73 @@
+//! Components that a projector selects and that nothing moves.
+
+use std::collections::BTreeSet;
+
+use tactflow_runtime::graph::OutlinedBlock;
+use tactflow_runtime::source::{Code, Diagnostic, Diagnostics, Edit, Item};
+
+use super::arm::Arm;
+use super::mode_law::ModeLaw;
+use crate::motion::COMPONENTS;
+use crate::tool::control::collect::law;
+use crate::tool::control::law::Law;
+use crate::tool::control::settings::{Nodes, source};
+
+/// Returns the warnings about components that a projector selects and that nothing moves.
+pub(super) fn check(arm: &Arm<'_>, mode: &ModeLaw<'_>) -> Diagnostics {
+    projectors(&mode.nodes, &arm.twist).into_iter().flat_map(|projector| idle_axes(arm, mode, projector)).collect()
+}
+
+fn idle_axes(arm: &Arm<'_>, mode: &ModeLaw<'_>, projector: &OutlinedBlock) -> Diagnostics {
+    let select = mode.nodes.node(&projector.name).and_then(|node| mode.nodes.value(node, "select"));
+    let behind = source(projector, "twist").map(|twist| law(&mode.nodes, twist));
+    let Some((setting, behind)) = select.zip(behind) else { return Diagnostics::new() };
+    let Some(select) = setting.value.read::<[f64; 6]>() else { return Diagnostics::new() };
+    // All components: the projector selects nothing.
+    let selects_all = select.iter().all(|entry| *entry != 0.0);
+    if selects_all || !behind.guidance.is_empty() || behind.features.is_empty() {
+        return Diagnostics::new();
+    }
+    // A component without a motion here may be selected for that of another mode.
+    let twist = source(projector, "twist").unwrap_or_default();
+    let laws: Vec<Law> = arm.modes.iter().map(|mode| law(&mode.nodes, twist)).collect();
+    let is_driven = |i: usize| laws.iter().flat_map(|law| &law.constants).any(|constant| constant.twist[i] != 0.0);
+    let columns = || laws.iter().flat_map(|law| &law.features).map(|feature| &feature.column);
+    let is_idle = |i: &usize| select[*i] != 0.0 && columns().all(|column| column[*i] == 0.0) && !is_driven(*i);
+    let jacobians: BTreeSet<&str> = behind.features.iter().map(|feature| &*feature.jacobian).collect();
+    let jacobians: Vec<String> = jacobians.into_iter().map(|name| format!("`{name}`")).collect();
+    let report = |i: usize| {
+        let name = COMPONENTS[i];
+        let entry = match &setting.value.item {
+            Item::Array(entries) => entries.get(i),
+            _ => None,
+        };
+        let place = entry.map_or_else(|| setting.value.span.clone(), |entry| entry.span.clone());
+        let (projector, jacobians) = (&projector.name, jacobians.join(" and "));
+        let message = format!("`{projector}` selects `{name}`, but no column of {jacobians} moves it");
+        let help = format!("write 0 for `{name}`, or add an entry to the column of the feature that it should control");
+        let diagnostic = Diagnostic::new(Code::IdleAxis, place.clone(), message).help(help);
+        match entry {
+            Some(_) => diagnostic.edit(Edit::Replace(place, "0".into())),
+            None => diagnostic,
+        }
+    };
+    (0..6).filter(is_idle).map(report).collect()
+}
+
+/// Returns the projectors between a port and what moves the sensor.
+fn projectors<'a>(nodes: &Nodes<'a>, port: &str) -> Vec<&'a OutlinedBlock> {
+    let Some(node) = nodes.writer(port) else { return Vec::new() };
+    let all = |inputs: &[&str]| -> Vec<&'a OutlinedBlock> {
+        let ports = inputs.iter().filter_map(|input| source(node, input));
+        ports.flat_map(|port| projectors(nodes, port)).collect()
+    };
+    match node.kind.text.as_str() {
+        "twist_adder" => node.wires.iter().flat_map(|wire| projectors(nodes, &wire.source)).collect(),
+        "twist_switch" => nodes.sides(node).flat_map(|side| projectors(nodes, side)).collect(),
+        // Not through a `twist_delay`, which can close a loop.
+        "twist_gate" => all(&["value"]),
+        "pivot" | "adjoint" => all(&["twist"]),
+        "projector" => [vec![node], all(&["twist"])].concat(),
+        _ => Vec::new(),
+    }
+}

@@ -1,0 +1,81 @@
+//! Columns that no mode uses, although their features have gains.
+
+use tactflow_runtime::source::{Code, Diagnostic, Diagnostics};
+
+use super::arm::Arm;
+use super::geometry::{Geometry, moved};
+use super::lines::line_axis;
+use super::mode_law::ModeLaw;
+use crate::tool::control::exits::Exit;
+use crate::tool::control::law::Feature;
+
+/// Returns the warnings about columns that no mode uses, although their features have gains.
+pub(super) fn check(arm: &Arm<'_>) -> Diagnostics {
+    let Some(first) = arm.modes.first() else { return Diagnostics::new() };
+    // Several nodes can turn the same control into motion.
+    let controls = |wanted: &Feature| {
+        let mut features = arm.modes.iter().flat_map(|mode| &mode.law.features);
+        features.any(|feature| feature.name == wanted.name && feature.pid == wanted.pid && feature.moves())
+    };
+    let is_selected = |wanted: &Feature| {
+        let mut features = arm.modes.iter().flat_map(|mode| &mode.law.features);
+        features.any(|one| one.name == wanted.name && one.pid == wanted.pid && one.column != [0.0; 6])
+    };
+    let features = first.law.features.iter().filter(|feature| feature.has_gain());
+    let dead = features.filter(|feature| !controls(feature) && !is_along_line(arm, feature));
+    let found = dead.filter_map(|feature| {
+        let column = first.column(feature)?;
+        // Of the components of the column, those that change the feature.
+        let row = first.quantity(feature).and_then(Geometry::of).filter(|row| row.changes(&column));
+        let answers = row.map(|row| row.components(" or "));
+        let (message, help) = match column == [0.0; 6] {
+            true => (
+                format!("the column of `{}` is zero, so its gains do nothing", feature.name),
+                "write how the sensor should move for it, or remove the feature".to_owned(),
+            ),
+            false if is_selected(feature) => (
+                format!(
+                    "`{0}` has gains only where no component of its column is selected: they do nothing",
+                    feature.name
+                ),
+                format!("give `{}` a gain in a mode that selects its column, or remove the feature", feature.name),
+            ),
+            false => (
+                format!("no mode selects a component of the column of `{}`, so its gains do nothing", feature.name),
+                format!(
+                    "select {} in a projector, {}",
+                    answers.unwrap_or_else(|| moved(&column)),
+                    without(arm, feature)
+                ),
+            ),
+        };
+        Some(Diagnostic::new(Code::UnusedColumn, first.place_of_column(feature), message).help(help))
+    });
+    found.collect()
+}
+
+/// Returns how to do without the gains of a feature.
+fn without(arm: &Arm<'_>, feature: &Feature) -> String {
+    match is_watched(arm, feature) {
+        true => {
+            format!("or measure the error of `{}` in a `feature_error` of its own, which no `pid` reads", feature.name)
+        }
+        false => "or remove the feature".into(),
+    }
+}
+
+/// Returns whether an exit of a mode waits for the error of a feature.
+fn is_watched(arm: &Arm<'_>, feature: &Feature) -> bool {
+    let Some(error) = feature.compared.as_ref().map(|node| format!("{node}.error.{}", feature.name)) else {
+        return false;
+    };
+    let exits = arm.modes.iter().flat_map(ModeLaw::conditions);
+    exits.filter_map(Exit::when).any(|port| error.ends_with(port))
+}
+
+/// Returns whether a feature is the position along a line whose direction the task controls. Such a position has no
+/// meaning where the line is longer than the pad, and a task is right to leave it out.
+fn is_along_line(arm: &Arm<'_>, feature: &Feature) -> bool {
+    let is_along = |mode: &ModeLaw<'_>| line_axis(mode).is_some_and(|axis| mode.quantity(feature) == Some(axis));
+    arm.modes.iter().any(is_along)
+}
