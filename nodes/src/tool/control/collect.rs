@@ -160,6 +160,26 @@ fn collect<'a>(nodes: &Nodes<'a>, port: &str, passage: &Passage, law: &mut Law, 
     path.pop();
 }
 
+/// Returns the projectors between a port and what moves the sensor.
+///
+/// It follows the same nodes as [`law`], with three differences: it passes gates that are closed in this mode, every
+/// `adjoint` whatever its pose, and no `twist_delay`, which can close a loop.
+pub(crate) fn projectors<'a>(nodes: &Nodes<'a>, port: &str) -> Vec<&'a OutlinedBlock> {
+    let Some(node) = nodes.writer(port) else { return Vec::new() };
+    let all = |inputs: &[&str]| -> Vec<&'a OutlinedBlock> {
+        let ports = inputs.iter().filter_map(|input| source(node, input));
+        ports.flat_map(|port| projectors(nodes, port)).collect()
+    };
+    match node.kind.text.as_str() {
+        "twist_adder" => node.wires.iter().flat_map(|wire| projectors(nodes, &wire.source)).collect(),
+        "twist_switch" => nodes.sides(node).flat_map(|side| projectors(nodes, side)).collect(),
+        "twist_gate" => all(&["value"]),
+        "pivot" | "adjoint" => all(&["twist"]),
+        "projector" => [vec![node], all(&["twist"])].concat(),
+        _ => Vec::new(),
+    }
+}
+
 /// Returns the pose of an `adjoint`, if it does not change and leaves the frame what it is: the pad is mounted otherwise
 /// than the columns say. Into another frame, the columns stay those of the frame in which they are written.
 fn still_pose(nodes: &Nodes<'_>, node: &OutlinedBlock) -> Option<Pose> {

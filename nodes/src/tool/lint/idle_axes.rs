@@ -8,17 +8,17 @@ use tactflow_runtime::source::{Code, Diagnostic, Diagnostics, Edit, Item};
 use super::arm::Arm;
 use super::mode_law::ModeLaw;
 use crate::motion::COMPONENTS;
-use crate::tool::control::collect::law;
+use crate::tool::control::collect::{law, projectors};
 use crate::tool::control::law::Law;
-use crate::tool::control::settings::{Nodes, source};
+use crate::tool::control::settings::source;
 
 /// Returns the warnings about components that a projector selects and that nothing moves.
-pub(super) fn check(arm: &Arm<'_>, mode: &ModeLaw<'_>) -> Diagnostics {
+pub(super) fn check<'a>(arm: &Arm<'a>, mode: &ModeLaw<'a>) -> Diagnostics {
     projectors(&mode.nodes, &arm.twist).into_iter().flat_map(|projector| idle_axes(arm, mode, projector)).collect()
 }
 
-fn idle_axes(arm: &Arm<'_>, mode: &ModeLaw<'_>, projector: &OutlinedBlock) -> Diagnostics {
-    let select = mode.nodes.node(&projector.name).and_then(|node| mode.nodes.value(node, "select"));
+fn idle_axes<'a>(arm: &Arm<'a>, mode: &ModeLaw<'a>, projector: &'a OutlinedBlock) -> Diagnostics {
+    let select = mode.nodes.value(projector, "select");
     let behind = source(projector, "twist").map(|twist| law(&mode.nodes, twist));
     let Some((setting, behind)) = select.zip(behind) else { return Diagnostics::new() };
     let Some(select) = setting.value.read::<[f64; 6]>() else { return Diagnostics::new() };
@@ -52,22 +52,4 @@ fn idle_axes(arm: &Arm<'_>, mode: &ModeLaw<'_>, projector: &OutlinedBlock) -> Di
         }
     };
     (0..6).filter(is_idle).map(report).collect()
-}
-
-/// Returns the projectors between a port and what moves the sensor.
-fn projectors<'a>(nodes: &Nodes<'a>, port: &str) -> Vec<&'a OutlinedBlock> {
-    let Some(node) = nodes.writer(port) else { return Vec::new() };
-    let all = |inputs: &[&str]| -> Vec<&'a OutlinedBlock> {
-        let ports = inputs.iter().filter_map(|input| source(node, input));
-        ports.flat_map(|port| projectors(nodes, port)).collect()
-    };
-    match node.kind.text.as_str() {
-        "twist_adder" => node.wires.iter().flat_map(|wire| projectors(nodes, &wire.source)).collect(),
-        "twist_switch" => nodes.sides(node).flat_map(|side| projectors(nodes, side)).collect(),
-        // Not through a `twist_delay`, which can close a loop.
-        "twist_gate" => all(&["value"]),
-        "pivot" | "adjoint" => all(&["twist"]),
-        "projector" => [vec![node], all(&["twist"])].concat(),
-        _ => Vec::new(),
-    }
 }
