@@ -136,6 +136,11 @@ impl Feature {
         (&self.jacobian, &self.name)
     }
 
+    /// Returns whether both are controlled by the same gains of the same `pid`.
+    pub(crate) fn has_gains_of(&self, other: &Self) -> bool {
+        self.pid == other.pid && self.name == other.name
+    }
+
     /// Returns whether both pass the same filters, gates, schedules and sides of switches.
     pub(super) fn takes_the_way_of(&self, other: &Self) -> bool {
         let filters = |one: &Self| one.filters.iter().map(|filter| filter.node.clone()).collect::<Vec<_>>();
@@ -147,7 +152,7 @@ impl Feature {
 
     /// Returns whether both are the same control.
     pub(super) fn is_same_control(&self, other: &Self) -> bool {
-        self.pid == other.pid && self.name == other.name && self.takes_the_way_of(other)
+        self.has_gains_of(other) && self.takes_the_way_of(other)
     }
 
     /// Returns whether another feature moves the arm by the same measurement at the same time, or presses by another one.

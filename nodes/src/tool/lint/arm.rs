@@ -67,7 +67,7 @@ impl<'a> Arm<'a> {
     /// Returns whether a feature has a gain in any mode.
     pub(super) fn has_gain(&self, feature: &Feature) -> bool {
         let mut features = self.modes.iter().flat_map(|mode| &mode.law.features);
-        features.any(|other| other.name == feature.name && other.pid == feature.pid && other.has_gain())
+        features.any(|other| other.has_gains_of(feature) && other.has_gain())
     }
 
     /// Returns what moves the arm in a mode, by the name that the mode has in its task.

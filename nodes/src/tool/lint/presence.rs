@@ -14,7 +14,7 @@ pub(super) fn check(arm: &Arm<'_>, found: &mut Diagnostics) {
     // A feature that another mode lets pass is meant for that mode.
     let passes = |wanted: &Feature| {
         let each = arm.modes.iter().flat_map(|mode| mode.moving().map(move |feature| (mode, feature)));
-        each.filter(|(_, feature)| feature.name == wanted.name && feature.pid == wanted.pid)
+        each.filter(|(_, feature)| feature.has_gains_of(wanted))
             .any(|(mode, feature)| barred(arm, mode, feature).is_none())
     };
     for mode in &arm.modes {

@@ -15,11 +15,11 @@ pub(super) fn check(arm: &Arm<'_>) -> Diagnostics {
     // Several nodes can turn the same control into motion.
     let controls = |wanted: &Feature| {
         let mut features = arm.modes.iter().flat_map(|mode| &mode.law.features);
-        features.any(|feature| feature.name == wanted.name && feature.pid == wanted.pid && feature.moves())
+        features.any(|feature| feature.has_gains_of(wanted) && feature.moves())
     };
     let is_selected = |wanted: &Feature| {
         let mut features = arm.modes.iter().flat_map(|mode| &mode.law.features);
-        features.any(|one| one.name == wanted.name && one.pid == wanted.pid && one.column != [0.0; 6])
+        features.any(|one| one.has_gains_of(wanted) && one.column != [0.0; 6])
     };
     let features = first.law.features.iter().filter(|feature| feature.has_gain());
     let dead = features.filter(|feature| !controls(feature) && !is_along_line(arm, feature));
