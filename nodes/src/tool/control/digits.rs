@@ -12,8 +12,8 @@ pub(crate) fn to_two_digits(number: f64, round: impl Fn(f64) -> f64) -> f64 {
     let digits = 1.0 - libm::floor(libm::log10(number.abs()));
     let scale = libm::pow(10.0, digits);
     let exact = round(number * scale) / scale;
-    // To the nearest number with few digits.
-    format!("{exact:.4}").parse().unwrap_or(exact)
+    // To the nearest number with two digits, because the division may leave more.
+    format!("{exact:.1e}").parse().unwrap_or(exact)
 }
 
 /// Returns a number with two digits that is not larger; 0 for a number that is not positive.
@@ -56,5 +56,15 @@ mod tests {
     fn a_number_keeps_three_digits_and_a_gain_never_grows() {
         assert_eq!([12.3456, -0.012345, 0.0, 1234.5].map(rounded_to_three_digits), [12.3, -0.0123, 0.0, 1230.0]);
         assert_eq!([12.99, 0.0199, 3.5].map(floored_to_two_digits), [12.0, 0.019, 3.5]);
+    }
+
+    #[test]
+    fn a_small_number_keeps_two_digits_and_its_direction() {
+        for number in [3.1e-5, 9.9e-5, 4.5e-4, 0.0123, 0.37, 5.6, 1234.5] {
+            let (down, up) = (down_to_two_digits(number), to_two_digits(number, libm::ceil));
+            assert!(0.9 * number < down && down <= number, "{down} is not {number}, rounded down");
+            assert!(number <= up && up < 1.1 * number, "{up} is not {number}, rounded up");
+        }
+        assert_eq!([3.15e-5, 1234.5].map(down_to_two_digits), [3.1e-5, 1200.0]);
     }
 }
