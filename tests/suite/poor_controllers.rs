@@ -14,7 +14,8 @@ use tactflow_tests::{catalogue, toml_files, workspace};
 
 use good::{good, good_at_second_sight, good_behind_nodes, good_by_modes, good_by_turns};
 use poor::{
-    more_wrong_columns, never_reached, opposed, poor_behind_nodes, poor_gains, poor_modes, poor_sums, wrong_columns,
+    HALF_TURN, more_wrong_columns, never_reached, opposed, poor_behind_nodes, poor_gains, poor_modes, poor_sums,
+    wrong_columns,
 };
 use variant::{graph, variant};
 
@@ -98,6 +99,20 @@ fn no_shipped_task_is_blamed_on_any_bench_that_it_runs_on() {
     }
     assert!(wrong.is_empty(), "{}", wrong.join("\n"));
     assert!(pairs > 100, "{pairs} pairs of a task and a bench");
+}
+
+/// Returns the help of the first warning of a variant.
+fn help(task: &'static str, changes: &[&str]) -> String {
+    let report = variant(task, changes).warnings().unwrap_or_else(|| panic!("{task}, {changes:?}: no warning"));
+    report.diagnostics[0].help.clone().unwrap()
+}
+
+#[test]
+fn behind_a_mount_the_right_column_is_that_behind_it() {
+    let contact = "set facts.arm.contacts=[{ object = \"ball\", x = { vx = 1.0 } }]";
+    let columns = ["columns.x = [1, 0, 0, 0, 0, 0]", "columns.y = [0, 1, 0, 0, 0, 0]"];
+    let help = help("hybrid", &[&HALF_TURN[..], &columns, &[contact]].concat());
+    assert!(help.contains("the column must be [1, 0, 0, 0, 0, 0]"), "{help}");
 }
 
 #[test]

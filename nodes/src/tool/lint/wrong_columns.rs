@@ -190,7 +190,7 @@ struct Other<'a> {
 /// Returns the warning about a column that increases the error of a feature of which only the bench says how it answers.
 fn reversed(arm: &Arm<'_>, mode: &ModeLaw<'_>, feature: &Feature) -> Option<Diagnostic> {
     let quantity = feature.quantity()?;
-    let column = mode.column(feature)?;
+    let column = judged_column(mode, feature)?;
     let gain = |contact: &&Contact| Some(contact.features.get(quantity)?.along(&feature.column));
     let contact = arm.contacts.iter().find(|contact| gain(contact).is_some_and(|gain| gain < 0.0))?;
     let message = format!(
