@@ -116,6 +116,29 @@ fn behind_a_mount_the_right_column_is_that_behind_it() {
 }
 
 #[test]
+fn an_exit_that_waits_for_another_error_does_not_need_this_one() {
+    let changes = |when: &str| {
+        [
+            "select = [0, 0, 1, 0, 0, 0]".to_owned(),
+            "set nodes.wide_error.type=\"feature_error\"".to_owned(),
+            "set nodes.wide_error.in.pressure=\"calm.value\"".to_owned(),
+            "set nodes.wide_error.in.orientation=\"touch.orientation\"".to_owned(),
+            "set nodes.wide_error.setpoint={ pressure = 0.1, orientation = 1.5708 }".to_owned(),
+            "set nodes.pid.in.error=\"wide_error.error\"".to_owned(),
+            format!("set modes.servo.go={{ to = \"approach\", when = {when:?}, above = 0.5, for_ms = 20 }}"),
+        ]
+    };
+    for (when, way) in [
+        ("wide_error.error.orientation", "measure the error of `orientation` in a `feature_error` of its own"),
+        ("error.error.orientation", "or remove the feature"),
+    ] {
+        let changes = changes(when);
+        let help = help("edge", &changes.each_ref().map(|change| &**change));
+        assert!(help.contains(way), "{when}: {help}");
+    }
+}
+
+#[test]
 fn a_rule_that_is_broken_on_purpose_is_allowed_with_its_reason() {
     let changes =
         ["gains.x = { kp = 17.5 }", "+[allow]", "+low-margin = \"it rings on purpose, to show what ringing is\""];

@@ -136,6 +136,13 @@ impl Feature {
         (&self.jacobian, &self.name)
     }
 
+    /// Returns whether a port, as a mode of its task calls it, is its error.
+    pub(crate) fn is_error(&self, port: &str) -> bool {
+        let error = self.compared.as_ref().map(|node| format!("{node}.error.{}", self.name));
+        let rest = error.as_ref().and_then(|error| error.strip_suffix(port));
+        rest.is_some_and(|part| part.is_empty() || part.ends_with('.'))
+    }
+
     /// Returns whether both are controlled by the same gains of the same `pid`.
     pub(crate) fn has_gains_of(&self, other: &Self) -> bool {
         self.pid == other.pid && self.name == other.name

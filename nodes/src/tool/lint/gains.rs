@@ -129,14 +129,14 @@ fn hunting(mode: &ModeLaw<'_>, feature: &Feature) -> Option<Diagnostic> {
 /// Returns the error at which a mode is left for one in which the feature has no integral. That of a force is large before
 /// it is pressed, and that of a place can be large in both directions.
 fn left_at(arm: &Arm<'_>, mode: &ModeLaw<'_>, feature: &Feature) -> Option<f64> {
-    let error = format!("{}.error.{}", feature.compared.as_ref()?, feature.name);
     let rests = |name: &str| {
         let other = arm.mode(name);
         let mut features = other.into_iter().flat_map(|mode| &mode.law.features);
         features.any(|one| one.id() == feature.id() && one.ki == 0.0)
     };
-    let is_own = |port: &str| port == error || error.ends_with(&format!(".{port}"));
-    let exits = mode.exits("go").filter(|exit| exit.when().is_some_and(is_own) && exit.to().is_some_and(rests));
+    let exits = mode
+        .exits("go")
+        .filter(|exit| exit.when().is_some_and(|port| feature.is_error(port)) && exit.to().is_some_and(rests));
     let exits: Vec<_> = exits.collect();
     let above = exits.iter().find_map(|exit| exit.number("above"))?;
     let below = exits.iter().find_map(|exit| exit.number("below"));

@@ -66,11 +66,8 @@ fn without(arm: &Arm<'_>, feature: &Feature) -> String {
 
 /// Returns whether an exit of a mode waits for the error of a feature.
 fn is_watched(arm: &Arm<'_>, feature: &Feature) -> bool {
-    let Some(error) = feature.compared.as_ref().map(|node| format!("{node}.error.{}", feature.name)) else {
-        return false;
-    };
     let exits = arm.modes.iter().flat_map(ModeLaw::conditions);
-    exits.filter_map(Exit::when).any(|port| error.ends_with(port))
+    exits.filter_map(Exit::when).any(|port| feature.is_error(port))
 }
 
 /// Returns whether a feature is the position along a line whose direction the task controls. Such a position has no
