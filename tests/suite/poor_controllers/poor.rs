@@ -387,6 +387,21 @@ pub(super) fn opposed() -> Vec<(&'static str, Variant)> {
         ("opposed-motion", variant("square", &["set modes.retreat.set.reach.twist=[0, 0, 0.015, 0, 0, 0]"])),
         ("opposed-motion", variant("square", &["set nodes.path.in_plane=false"])),
         ("opposed-motion", variant("edge", &["set modes.servo.set.reach.twist=[0, 0, 0.02, 0, 0, 0]"])),
+        // A motion that only a contact lets pass.
+        (
+            "opposed-motion",
+            variant(
+                "edge",
+                &[
+                    "set nodes.press.type=\"twist_source\"",
+                    "set nodes.press.twist=[0, 0, 0.02, 0, 0, 0]",
+                    "set nodes.felt.type=\"twist_gate\"",
+                    "set nodes.felt.in.value=\"press.twist\"",
+                    "set nodes.felt.in.gate=\"touch.present\"",
+                    "set nodes.sum.in.felt=\"felt.value\"",
+                ],
+            ),
+        ),
         (
             "opposed-motion",
             with_feature(

@@ -80,6 +80,11 @@ impl Passage {
     fn is_open(&self, nodes: &Nodes<'_>) -> bool {
         self.sides.is_empty() && self.gates.iter().all(|gate| nodes.is_open(gate))
     }
+
+    /// Returns whether no gate or switch stands in the way that may be closed during a contact.
+    fn is_open_in_contact(&self, nodes: &Nodes<'_>) -> bool {
+        self.sides.is_empty() && self.gates.iter().all(|gate| nodes.is_open_in_contact(gate))
+    }
 }
 
 /// Returns what the twist of a port is made of.
@@ -212,7 +217,8 @@ fn constant(nodes: &Nodes<'_>, node: &OutlinedBlock, passage: &Passage) -> Optio
         return None;
     }
     let is_open = passage.is_open(nodes) && gate.is_none_or(|gate| nodes.is_open(gate));
-    let is_open_in_contact = passage.is_open(nodes) && gate.is_none_or(|gate| nodes.is_open_in_contact(gate));
+    let is_open_in_contact =
+        passage.is_open_in_contact(nodes) && gate.is_none_or(|gate| nodes.is_open_in_contact(gate));
     let name = node.name.clone();
     twist.iter().any(|part| *part != 0.0).then_some(Constant { node: name, twist, is_open, is_open_in_contact })
 }
