@@ -136,9 +136,14 @@ impl Feature {
         (&self.jacobian, &self.name)
     }
 
+    /// Returns the port of its error; `None` if nothing compares it with a setpoint.
+    pub(crate) fn error_port(&self) -> Option<String> {
+        self.compared.as_ref().map(|node| format!("{node}.error.{}", self.name))
+    }
+
     /// Returns whether a port, as a mode of its task calls it, is its error.
     pub(crate) fn is_error(&self, port: &str) -> bool {
-        let error = self.compared.as_ref().map(|node| format!("{node}.error.{}", self.name));
+        let error = self.error_port();
         let rest = error.as_ref().and_then(|error| error.strip_suffix(port));
         rest.is_some_and(|part| part.is_empty() || part.ends_with('.'))
     }
@@ -182,6 +187,11 @@ impl Feature {
     /// during a contact.
     pub(crate) fn is_open_in_contact(&self, nodes: &Nodes<'_>) -> bool {
         self.sides.is_empty() && self.gates.iter().all(|gate| nodes.is_open_in_contact(gate))
+    }
+
+    /// Returns the largest factor on its gains, or 1 if its schedules only make them smaller [1].
+    pub(crate) fn largest_schedule(&self) -> f64 {
+        self.schedules.iter().map(|schedule| schedule.max.max(1.0)).product()
     }
 
     /// Returns the delay of the filters that smooth it [s].

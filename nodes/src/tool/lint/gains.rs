@@ -39,8 +39,7 @@ const SLOW: f64 = 1.0 / 60.0;
 fn slow(arm: &Arm<'_>, mode: &ModeLaw<'_>, feature: &Feature) -> Option<Diagnostic> {
     let quantity = mode.quantity(feature)?;
     let gain = largest_gain(arm, feature, quantity)?;
-    let scheduled = feature.schedules.iter().map(|schedule| schedule.max.max(1.0)).product::<f64>();
-    let rate = feature.kp * scheduled * gain;
+    let rate = feature.kp * feature.largest_schedule() * gain;
     let is_alone = feature.kp > 0.0 && feature.ki == 0.0 && feature.beside.is_empty();
     if rate >= SLOW || !is_alone {
         return limited(mode, feature, quantity, gain);
@@ -72,7 +71,7 @@ fn limited(mode: &ModeLaw<'_>, feature: &Feature, quantity: &str, gain: f64) -> 
         "orientation" => (0.5, "rad"),
         _ => return None,
     };
-    let limit = mode.limit(feature)?;
+    let limit = mode.gain(feature, "limit")?;
     let time = usual / (limit * gain);
     if time * SLOW <= 1.0 {
         return None;
@@ -152,8 +151,7 @@ fn windup(arm: &Arm<'_>, mode: &ModeLaw<'_>, feature: &Feature) -> Option<Diagno
     if setpoint(arm, mode, feature).is_some() {
         return None;
     }
-    let pid = mode.nodes.node(feature.pid.as_deref()?)?;
-    let number = |key: &str| mode.nodes.number(pid, &format!("gains.{}.{key}", feature.name));
+    let number = |key: &str| mode.gain(feature, key);
     let is_bound = |error: f64| error < arm.largest_error(mode, feature);
     if feature.ki == 0.0 || number("within").is_some_and(is_bound) || left_at(arm, mode, feature).is_some_and(is_bound)
     {
@@ -164,7 +162,7 @@ fn windup(arm: &Arm<'_>, mode: &ModeLaw<'_>, feature: &Feature) -> Option<Diagno
     let [linear, angular] =
         ["linear_m_per_s", "angular_rad_per_s"].map(|key| mode.nodes.number(limiter, key).unwrap_or(f64::INFINITY));
     // The control at which the first component of the motion reaches its limit.
-    let scheduled = feature.schedules.iter().map(|schedule| schedule.max.max(1.0)).product::<f64>();
+    let scheduled = feature.largest_schedule();
     let shares = (0..6).map(|i| if i < 3 { linear } else { angular } / (scheduled * feature.column[i].abs()));
     let full = shares.fold(f64::INFINITY, f64::min);
     let bound = [number("bound"), number("limit")].into_iter().flatten().fold(f64::INFINITY, f64::min);

@@ -8,6 +8,9 @@ use tactflow_runtime::graph::{NO_SPAN, OutlinedBlock, OutlinedMode};
 use crate::tool::control::law::{Feature, Guidance, Law};
 use crate::tool::control::settings::{Nodes, source};
 
+/// Types of the nodes that measure a contact, and whose geometry is known.
+const MEASURING: [&str; 6] = ["moments", "principal_axes", "hough", "curvature", "shear", "contact_area"];
+
 /// What moves an arm in one mode.
 pub(super) struct ModeLaw<'a> {
     pub(super) mode: Option<&'a OutlinedMode>,
@@ -53,9 +56,7 @@ impl<'a> ModeLaw<'a> {
     pub(super) fn quantity_of<'p>(&self, port: &'p str) -> Option<&'p str> {
         let node = self.nodes.writer(port)?;
         let frame = node.outputs.iter().find(|output| output.name == port)?.frames.first()?.as_deref()?;
-        let is_known = ["moments", "principal_axes", "hough", "curvature", "shear", "contact_area"]
-            .contains(&&*node.kind.text)
-            && self.carried.contains(frame);
+        let is_known = MEASURING.contains(&&*node.kind.text) && self.carried.contains(frame);
         is_known.then(|| port.rsplit('.').next())?
     }
 
@@ -77,16 +78,10 @@ impl<'a> ModeLaw<'a> {
         self.nodes.value(jacobian, &format!("columns.{}", feature.name))?.value.read()
     }
 
-    /// Returns the largest control of a feature.
-    pub(super) fn limit(&self, feature: &Feature) -> Option<f64> {
+    /// Returns one of the gains of a feature, or a bound of its control.
+    pub(super) fn gain(&self, feature: &Feature, key: &str) -> Option<f64> {
         let pid = self.nodes.node(feature.pid.as_deref()?)?;
-        self.nodes.number(pid, &format!("gains.{}.limit", feature.name))
-    }
-
-    /// Returns the error within which the integral of a feature grows.
-    pub(super) fn within(&self, feature: &Feature) -> Option<f64> {
-        let pid = self.nodes.node(feature.pid.as_deref()?)?;
-        self.nodes.number(pid, &format!("gains.{}.within", feature.name))
+        self.nodes.number(pid, &format!("gains.{}.{key}", feature.name))
     }
 
     /// Returns the place of the column of a feature.
@@ -97,6 +92,11 @@ impl<'a> ModeLaw<'a> {
     /// Returns the place of a gain of a feature.
     pub(super) fn place_of_gain(&self, feature: &Feature, gain: &str) -> Range<usize> {
         self.place(feature.pid.as_deref().unwrap_or_default(), &format!("gains.{}.{gain}", feature.name))
+    }
+
+    /// Returns the place of the setpoint of a feature; `None` if nothing compares the feature with one.
+    pub(super) fn place_of_setpoint(&self, feature: &Feature) -> Option<Range<usize>> {
+        Some(self.place(feature.compared.as_deref()?, &format!("setpoint.{}", feature.name)))
     }
 
     /// Returns where a value of a node is written; the place of the node if it is a default.

@@ -26,7 +26,7 @@ fn retreat(mode: &ModeLaw<'_>) -> Option<Diagnostic> {
     let (node, speed) = away(mode)?;
     let presses = |feature: &&Feature| {
         let least = feature.schedules.iter().map(|schedule| schedule.min).product::<f64>();
-        let limit = mode.limit(feature).unwrap_or(f64::INFINITY);
+        let limit = mode.gain(feature, "limit").unwrap_or(f64::INFINITY);
         let most = feature.setpoint.map(|setpoint| (feature.kp * least * setpoint).min(limit) * feature.column[2]);
         mode.quantity(feature).is_some_and(is_force)
             && feature.is_open_in_contact(&mode.nodes)
@@ -131,7 +131,7 @@ fn pressed(arm: &Arm<'_>, mode: &ModeLaw<'_>) -> Option<Diagnostic> {
     let constant = open().find(|constant| constant.twist[2] > 0.0)?;
     let shift = |feature: &Feature| speed / (feature.kp * feature.column[2]);
     let is_shifted = |feature: &&Feature| {
-        let within = mode.within(feature).filter(|_| feature.ki > 0.0);
+        let within = mode.gain(feature, "within").filter(|_| feature.ki > 0.0);
         let is_left = feature.ki == 0.0 || within.is_some_and(|within| within < shift(feature));
         mode.quantity(feature).is_some_and(is_force)
             && is_left

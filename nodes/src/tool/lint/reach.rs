@@ -86,8 +86,7 @@ pub(super) fn setpoint(arm: &Arm<'_>, mode: &ModeLaw<'_>, feature: &Feature) -> 
         ),
         _ => return None,
     };
-    let node = feature.compared.as_deref()?;
-    Some(Diagnostic::new(Code::UnreachableSetpoint, mode.place(node, &format!("setpoint.{name}")), message).help(help))
+    Some(Diagnostic::new(Code::UnreachableSetpoint, mode.place_of_setpoint(feature)?, message).help(help))
 }
 
 /// Returns the warning about a deadband in which a feature always rests, or for good once the contact is lost.
@@ -129,8 +128,7 @@ fn beside_window(mode: &ModeLaw<'_>, feature: &Feature) -> Option<Diagnostic> {
         window.name
     );
     let help = format!("write a setpoint between {from} and {to}, or a larger `size` of `{}`", window.name);
-    let place = mode.place(feature.compared.as_deref()?, &format!("setpoint.{name}"));
-    Some(Diagnostic::new(Code::UnreachableSetpoint, place, message).help(help))
+    Some(Diagnostic::new(Code::UnreachableSetpoint, mode.place_of_setpoint(feature)?, message).help(help))
 }
 
 /// Returns whether a mode is meant to end without a contact: an exit waits for that, or the sensor moves away after it.

@@ -96,8 +96,7 @@ impl Trial<'_> {
         let period = compiled.outline().period_s;
         let mut engine = Engine::new(compiled);
         let ports = features.iter().map(|one| {
-            let node = one.feature.compared.as_deref().unwrap_or_default();
-            let port = format!("{node}.error.{}", one.feature.name);
+            let port = one.feature.error_port().unwrap_or_else(|| format!(".error.{}", one.feature.name));
             PortColumns::find(engine.ports(), &port).ok_or_else(|| Stop::Refused(format!("no port is `{port}`")))
         });
         let ports: Vec<ScalarId> = ports.collect::<Result<_, _>>()?;
