@@ -7,12 +7,11 @@ use nalgebra::Vector3;
 use tactflow_runtime::source::{Code, Diagnostic, Diagnostics, Table, Value};
 
 use super::arm::Arm;
+use super::guides::{follows_line, rests};
 use super::mode_law::ModeLaw;
 use crate::motion::pose::pose_of;
 use crate::tool::control::law::{Feature, Guidance};
 
-/// Nodes that guide the sensor along a line.
-const LINE_GUIDES: [&str; 2] = ["ridge_guide", "follow_path"];
 /// Largest angle between a line and an axis of the sensor along which the line lies [rad].
 const ALONG: f64 = 0.35;
 /// Largest part of an axis along z of the sensor with which it lies in the plane of the pad [1].
@@ -34,8 +33,7 @@ fn along_line(arm: &Arm<'_>, mode: &ModeLaw<'_>) -> Option<Diagnostic> {
         !positions.is_empty() && axes.all(moves)
     };
     let mut constants = mode.law.constants.iter().filter(|constant| along(&|i| constant.twist[i] != 0.0));
-    let is_guide =
-        |guide: &&Guidance| LINE_GUIDES.contains(&&*guide.kind) && !mode.rests(guide) && along(&|i| guide.passes[i]);
+    let is_guide = |guide: &&Guidance| follows_line(guide) && !rests(&mode.nodes, guide) && along(&|i| guide.passes[i]);
     let guide = || mode.law.guidance.iter().find(is_guide).map(Guidance::node);
     let held = |i: usize| {
         let axis = ["x", "y"][i];

@@ -11,8 +11,10 @@
 //! | what moves it in one mode, and where is that written? | `mode_law` |
 //! | which exits of a mode wait for what? | `exits` |
 //! | how does a feature answer a motion, by geometry? | `geometry` |
+//! | what does a node do that guides the arm? | `guides` |
 //! | can the contacts of the bench be read? | `unread` |
-//! | does a mode roll without a force, or wait without a motion? | `modes` |
+//! | does a mode roll without a force? | `rolling` |
+//! | does a mode wait for a contact without a motion? | `approach` |
 //! | is a setpoint, an exit, a deadband or a threshold out of reach? | `reach` |
 //! | is a place controlled along a line? | `lines` |
 //! | do motions work against each other? | `opposed` |
@@ -24,18 +26,20 @@
 //! | does a gain do harm whatever is touched? | `gains` |
 //! | is a loop near instability over a contact? | `stability` |
 
+mod approach;
 mod arm;
 mod exits;
 mod gains;
 mod geometry;
+mod guides;
 mod idle_axes;
 mod lines;
 mod mode_law;
-mod modes;
 mod opposed;
 mod presence;
 mod reach;
 mod recovery;
+mod rolling;
 mod stability;
 mod unread;
 mod unused_columns;
@@ -65,7 +69,7 @@ pub(crate) fn lint(outline: &Outline, facts: &[(String, toml::Value)]) -> Diagno
         let Some(arm) = Arm::of((outline, &index, &carried), facts, (command, port)) else { continue };
         found.extend(unread::misnamed(outline, &arm, name));
         let before = found.len();
-        modes::check(&arm, &mut found);
+        found.extend(contacts(&arm));
         reach::check(&arm, &mut found);
         lines::check(&arm, &mut found);
         opposed::check(&arm, &mut found);
@@ -81,6 +85,11 @@ pub(crate) fn lint(outline: &Outline, facts: &[(String, toml::Value)]) -> Diagno
     let mut seen = BTreeSet::new();
     found.retain(|one| seen.insert((one.code, one.span.start)));
     found
+}
+
+/// Returns the warnings about modes that lose their contact, or that never touch.
+fn contacts(arm: &Arm<'_>) -> Diagnostics {
+    arm.modes.iter().flat_map(|mode| [rolling::check(arm, mode), approach::check(arm, mode)]).flatten().collect()
 }
 
 /// Returns the warnings about columns and about what projectors select of them.

@@ -5,6 +5,7 @@ use std::ops::Range;
 
 use tactflow_runtime::graph::{NO_SPAN, OutlinedBlock, OutlinedMode};
 
+use super::guides::{is_composed, parks};
 use crate::tool::control::law::{Feature, Guidance, Law};
 use crate::tool::control::settings::{Nodes, source};
 
@@ -29,14 +30,13 @@ impl<'a> ModeLaw<'a> {
     /// Returns the speed along +z with which the mode moves the sensor whatever it feels [m/s].
     pub(super) fn approach(&self) -> f64 {
         let constant: f64 = self.law.constants.iter().map(|constant| constant.twist[2]).sum();
-        let composed = self.law.guidance.iter().filter(|guide| guide.kind == "compose_twist" && guide.passes[2]);
+        let composed = self.law.guidance.iter().filter(|guide| is_composed(guide) && guide.passes[2]);
         constant + composed.filter_map(|guide| self.generated(guide)).sum::<f64>()
     }
 
     /// Returns whether the mode moves the sensor away from the object.
     pub(super) fn backs_off(&self) -> bool {
-        let lifts = |guide: &Guidance| guide.kind == "park" && guide.passes[2] && !self.rests(guide);
-        self.approach() < 0.0 || self.law.guidance.iter().any(lifts)
+        self.approach() < 0.0 || self.law.guidance.iter().any(|guide| parks(&self.nodes, guide))
     }
 
     /// Returns the largest speed along z that a `signal_generator` gives to a composed twist [m/s].
@@ -104,12 +104,6 @@ impl<'a> ModeLaw<'a> {
         let Some(node) = self.nodes.node(node) else { return NO_SPAN };
         let written = self.nodes.value(node, path).map(|setting| setting.value.span.clone());
         written.filter(|span| *span != NO_SPAN).unwrap_or_else(|| node.span.clone())
-    }
-
-    /// Returns whether a node that guides the sensor has a speed of 0 in this mode.
-    pub(super) fn rests(&self, guide: &Guidance) -> bool {
-        let node = self.nodes.node(guide.node());
-        node.and_then(|node| self.nodes.number(node, "speed_m_per_s")) == Some(0.0)
     }
 
     /// Returns the start of a message about this mode.

@@ -4,12 +4,11 @@ use tactflow_runtime::source::{Code, Diagnostic, Diagnostics, Item, Table};
 
 use super::arm::Arm;
 use super::geometry::is_force;
+use super::guides::{holds, may_press, parks};
 use super::mode_law::ModeLaw;
-use super::modes::GUIDES;
 use crate::motion::COMPONENTS;
 use crate::tool::control::exits::Exit;
 use crate::tool::control::law::{Feature, Guidance};
-use crate::tool::control::settings::source;
 
 pub(super) fn check(arm: &Arm<'_>, found: &mut Diagnostics) {
     for mode in &arm.modes {
@@ -47,7 +46,7 @@ fn away<'a>(mode: &'a ModeLaw<'_>) -> Option<(&'a str, f64)> {
     let constants = || mode.law.constants.iter().map(|constant| (&*constant.node, constant.twist[2]));
     let speed: f64 = constants().map(|(_, speed)| speed).sum();
     let constant = constants().find(|(_, own)| all_open && speed < 0.0 && *own < 0.0).map(|(node, _)| (node, -speed));
-    let parks = |guide: &&Guidance| guide.kind == "park" && guide.is_open && guide.passes[2] && !mode.rests(guide);
+    let parks = |guide: &&Guidance| guide.is_open && parks(&mode.nodes, guide);
     // It is slower at the end of its way.
     let park = || mode.law.guidance.iter().find(parks).map(|guide| (guide.node(), 0.0));
     constant.or_else(park)
@@ -56,7 +55,7 @@ fn away<'a>(mode: &'a ModeLaw<'_>) -> Option<(&'a str, f64)> {
 /// Returns the warning about a feature that moves the sensor along a component in which a node holds it at a place.
 fn held(mode: &ModeLaw<'_>) -> Option<Diagnostic> {
     let (guide, feature, i) = mode.law.guidance.iter().find_map(|guide| {
-        let holds = holds(mode, guide)?;
+        let holds = holds(&mode.nodes, guide)?;
         let moves = |feature: &Feature| (0..6).find(|i| holds[*i] && guide.passes[*i] && feature.column[*i] != 0.0);
         let mut open = mode.moving().filter(|feature| guide.is_open && feature.is_open_in_contact(&mode.nodes));
         open.find_map(|feature| Some((guide, feature, moves(feature)?)))
@@ -72,33 +71,13 @@ fn held(mode: &ModeLaw<'_>) -> Option<Diagnostic> {
     Some(report(mode, feature, message, &deselect(i)))
 }
 
-/// Returns the components in which a node holds the sensor at a place in a mode. One with a gate may hold it at other
-/// times.
-fn holds(mode: &ModeLaw<'_>, guide: &Guidance) -> Option<[bool; 6]> {
-    let node = mode.nodes.node(guide.node())?;
-    let moves = |key: &str| mode.nodes.number(node, key).is_some_and(|speed| speed > 0.0);
-    let (linear, angular) = (moves("speed_m_per_s"), moves("speed_rad_per_s"));
-    match guide.kind.as_str() {
-        "hold_pose" if source(node, "gate").is_none_or(|gate| mode.nodes.is_open_in_contact(gate)) => {
-            Some(std::array::from_fn(|i| if i < 3 { linear } else { angular }))
-        }
-        "follow_path" => {
-            // Otherwise the force holds the distance to the surface on which the path lies.
-            let is_in_plane = mode.nodes.value(node, "in_plane").and_then(|value| value.value.read()).unwrap_or(false);
-            Some([linear, linear, linear && !is_in_plane, false, false, false])
-        }
-        _ => None,
-    }
-}
-
 /// Returns the warning about a mode that moves on into the object that the modes before have pressed, where nothing that
 /// the pad feels ends it.
 fn push(arm: &Arm<'_>, mode: &ModeLaw<'_>) -> Option<Diagnostic> {
     let speed: f64 = mode.law.constants.iter().map(|constant| constant.twist[2]).sum();
     let controls = |mode: &ModeLaw<'_>| mode.moving().any(|feature| feature.column[2] != 0.0);
     let feels = mode.watches() || mode.lost().next().is_some();
-    let presses = |guide: &Guidance| guide.passes[2] && !GUIDES.contains(&&*guide.kind);
-    if speed <= 0.0 || controls(mode) || feels || mode.law.guidance.iter().any(presses) {
+    if speed <= 0.0 || controls(mode) || feels || mode.law.guidance.iter().any(may_press) {
         return None;
     }
     let leads = |exit: Exit<'_>| exit.to() == Some(mode.own_name()) && !exit.is_lost();
