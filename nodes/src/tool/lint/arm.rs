@@ -75,6 +75,11 @@ impl<'a> Arm<'a> {
         self.modes.iter().find(|mode| mode.own_name() == name)
     }
 
+    /// Returns whether the sensor moves away from the object in a mode.
+    pub(super) fn leaves(&self, mode: &str) -> bool {
+        self.mode(mode).is_some_and(ModeLaw::backs_off)
+    }
+
     /// Returns the smallest limit of a force, and its key.
     pub(super) fn force_limit(&self, mode: &ModeLaw<'_>, quantity: &str) -> Option<(f64, String)> {
         let limit = match quantity {

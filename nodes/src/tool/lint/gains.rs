@@ -1,11 +1,12 @@
 //! Gains that do harm whatever is touched: derivatives of noise, integrals that wind up, and gains of zero.
 
-use tactflow_runtime::source::{Code, Diagnostic, Diagnostics, Edit};
+use tactflow_runtime::source::{Code, Diagnostic, Diagnostics};
 
 use super::arm::Arm;
+use super::deadbands::hunting;
 use super::geometry::is_force;
 use super::mode_law::ModeLaw;
-use super::reach::setpoint;
+use super::reach::unreachable;
 use crate::tool::control::contacts::Answer;
 use crate::tool::control::digits::to_two_digits;
 use crate::tool::control::law::Feature;
@@ -107,24 +108,6 @@ fn unfiltered(mode: &ModeLaw<'_>, feature: &Feature) -> Option<Diagnostic> {
     Some(Diagnostic::new(Code::UnfilteredDerivative, mode.place_of_gain(feature, "kd"), message).help(help))
 }
 
-/// Returns the warning about an integral that goes on to move its feature while a deadband lets it rest.
-fn hunting(mode: &ModeLaw<'_>, feature: &Feature) -> Option<Diagnostic> {
-    let (name, band) = (&feature.name, mode.deadband(feature)?);
-    mode.nodes.number(band, &format!("width.{name}.outer"))?;
-    let inside = mode.nodes.value(band, "inside")?;
-    if feature.ki == 0.0 || inside.value.as_str() != Some("zero") {
-        return None;
-    }
-    let message = format!(
-        "`{}` makes a small error of `{name}` zero, but its integral stays: it moves `{name}` through the band and out at the \
-         other side",
-        band.name
-    );
-    let (place, right) = (inside.value.span.clone(), "\"absent\"");
-    let diagnostic = Diagnostic::new(Code::Windup, place.clone(), message);
-    Some(diagnostic.help(format!("write `inside = {right}`")).edit(Edit::Replace(place, right.into())))
-}
-
 /// Returns the error at which a mode is left for one in which the feature has no integral. That of a force is large before
 /// it is pressed, and that of a place can be large in both directions.
 fn left_at(arm: &Arm<'_>, mode: &ModeLaw<'_>, feature: &Feature) -> Option<f64> {
@@ -148,7 +131,7 @@ fn left_at(arm: &Arm<'_>, mode: &ModeLaw<'_>, feature: &Feature) -> Option<f64> 
 /// Returns the warning about an integral that grows at every error, up to a motion at full speed.
 fn windup(arm: &Arm<'_>, mode: &ModeLaw<'_>, feature: &Feature) -> Option<Diagnostic> {
     // A setpoint out of reach has its own warning.
-    if setpoint(arm, mode, feature).is_some() {
+    if unreachable(arm, mode, feature).is_some() {
         return None;
     }
     let number = |key: &str| mode.gain(feature, key);

@@ -15,7 +15,9 @@
 //! | can the contacts of the bench be read? | `unread` |
 //! | does a mode roll without a force? | `rolling` |
 //! | does a mode wait for a contact without a motion? | `approach` |
-//! | is a setpoint, an exit, a deadband or a threshold out of reach? | `reach` |
+//! | is a setpoint or a threshold out of reach? | `reach` |
+//! | does an exit wait for too large a force? | `exit_bounds` |
+//! | does a feature always rest in a deadband, or move through it? | `deadbands` |
 //! | is a place controlled along a line? | `lines` |
 //! | do motions work against each other? | `opposed` |
 //! | is a lost contact searched for too fast? | `recovery` |
@@ -28,6 +30,8 @@
 
 mod approach;
 mod arm;
+mod deadbands;
+mod exit_bounds;
 mod exits;
 mod gains;
 mod geometry;
