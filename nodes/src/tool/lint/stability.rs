@@ -31,12 +31,42 @@ const SLOW: f64 = 0.25;
 /// Gain of one period at which `pid` itself warns [1].
 const DIVERGES: f64 = 2.0;
 
+/// A loop, and what its filters do to it.
+struct Judged {
+    margins: Margins,
+    /// Lag of the filters where the gain is 1, and 0 if it never is [deg].
+    lag: f64,
+}
+
+impl Judged {
+    /// Returns whether the filters take the phase margin of the loop.
+    fn is_slow(&self) -> bool {
+        let Margins { is_stable, phase_deg, .. } = self.margins;
+        let has_phase = is_stable && phase_deg.is_none_or(|phase| phase >= GOOD_PHASE);
+        self.lag > MAX_LAG && !has_phase
+    }
+
+    /// Returns whether the loop keeps its margins with filters that are quick enough.
+    fn is_good(&self) -> bool {
+        KEPT.holds(&self.margins) && !self.is_slow()
+    }
+}
+
+/// Judges a loop with the filters of a feature.
+fn judged(feature: &Feature, around: &Loop) -> Judged {
+    let margins = margins(around);
+    let omega = |hz: f64| 2.0 * std::f64::consts::PI * hz;
+    let lag = |hz: f64| {
+        let responses = feature.filters.iter().map(|filter| filter.shape.response(omega(hz), around.period));
+        responses.map(|response| -response.arg().to_degrees()).sum()
+    };
+    Judged { margins, lag: margins.crossover_hz.map_or(0.0, lag) }
+}
+
 /// A loop over a contact that was not ample.
 struct Found<'a> {
     object: &'a str,
-    margins: Margins,
-    /// Lag of the filters where the gain is 1 [deg].
-    lag: f64,
+    judged: Judged,
 }
 
 pub(super) fn check(arm: &Arm<'_>, found: &mut Diagnostics) {
@@ -91,37 +121,23 @@ fn judge(mode: &ModeLaw<'_>, feature: &Feature, contacts: &[Contact]) -> Option<
     let all: Vec<Found<'_>> = loops
         .iter()
         .filter(|(_, around)| !AMPLE.holds(&rough_margins(around)))
-        .map(|(contact, around)| {
-            let margins = margins(around);
-            let lag = margins.crossover_hz.map_or(0.0, |hz| lag(feature, hz, period));
-            Found { object: &contact.object, margins, lag }
-        })
+        .map(|(contact, around)| Found { object: &contact.object, judged: judged(feature, around) })
         .collect();
-    let peak =
-        |found: &&Found<'_>| if found.margins.is_stable { found.margins.peak_sensitivity } else { f64::INFINITY };
+    let peak = |found: &&Found<'_>| match found.judged.margins {
+        Margins { is_stable: true, peak_sensitivity, .. } => peak_sensitivity,
+        _ => f64::INFINITY,
+    };
     let worst = |is: &dyn Fn(&Found<'_>) -> bool| {
         all.iter().filter(|found| is(found)).max_by(|one, other| peak(one).total_cmp(&peak(other)))
     };
-    let low = worst(&|found| !KEPT.holds(&found.margins));
-    let slow = worst(&|found| is_slow(&found.margins, found.lag)).filter(|_| low.is_none() || feature.delay() > SLOW);
+    let low = worst(&|found| !KEPT.holds(&found.judged.margins));
+    let slow = worst(&|found| found.judged.is_slow()).filter(|_| low.is_none() || feature.delay() > SLOW);
     match (slow, low) {
         (Some(slow), low) => slow_filter(mode, feature, contacts, slow)
             .or_else(|| low.map(|low| low_margin(mode, feature, (contacts, &loops), low))),
         (_, Some(low)) => Some(low_margin(mode, feature, (contacts, &loops), low)),
         _ => None,
     }
-}
-
-/// Returns whether filters with this lag [deg] take the phase margin of a loop.
-fn is_slow(margins: &Margins, lag: f64) -> bool {
-    let has_phase = margins.is_stable && margins.phase_deg.is_none_or(|phase| phase >= GOOD_PHASE);
-    lag > MAX_LAG && !has_phase
-}
-
-/// Returns the lag of the filters of a feature at a frequency [deg].
-fn lag(feature: &Feature, hz: f64, period: f64) -> f64 {
-    let omega = 2.0 * std::f64::consts::PI * hz;
-    feature.filters.iter().map(|filter| -filter.shape.response(omega, period).arg().to_degrees()).sum()
 }
 
 /// Returns how a message names a contact.
@@ -145,12 +161,14 @@ fn low_margin(
     low: &Found<'_>,
 ) -> Diagnostic {
     let (name, place) = (&feature.name, mode.place_of_gain(feature, "kp"));
-    let message = match low.margins.is_stable {
-        true => format!("the loop of `{name}` is near instability {}: {}", over(low.object), figures(&low.margins)),
+    let message = match low.judged.margins.is_stable {
+        true => {
+            format!("the loop of `{name}` is near instability {}: {}", over(low.object), figures(&low.judged.margins))
+        }
         false => format!("the loop of `{name}` is unstable {}", over(low.object)),
     };
     let diagnostic = Diagnostic::new(Code::LowMargin, place, message);
-    let diagnostic = match slowest(feature).filter(|_| low.lag > MAX_LAG) {
+    let diagnostic = match slowest(feature).filter(|_| low.judged.lag > MAX_LAG) {
         Some((_, filter)) => diagnostic.note(
             mode.place(&filter.node, ""),
             format!("the filters delay `{name}` by {:.0} ms in all, most of them this one", feature.smoothing() * 1e3),
@@ -169,7 +187,7 @@ fn low_margin(
             .edit(Edit::Replace(kd, without));
     }
     let Some(factor) =
-        factor(&loops, KEPT).filter(|factor| *factor < 1.0).and_then(|factor| quick(mode, feature, &loops, factor))
+        factor(&loops, KEPT).filter(|factor| *factor < 1.0).and_then(|factor| quick(feature, &loops, factor))
     else {
         return diagnostic
             .help("no gain keeps the margins: use faster filters, or a smaller `ki` in proportion to `kp`");
@@ -187,24 +205,13 @@ fn low_margin(
 
 /// Returns the place of a derivative gain that alone takes the margins of all loops, and what stands there without it.
 fn undamped(mode: &ModeLaw<'_>, feature: &Feature, loops: &[Loop]) -> Option<(Range<usize>, String)> {
-    let period = mode.nodes.period();
-    let is_good = |around: &Loop| {
-        let found = margins(&around.without_derivative());
-        KEPT.holds(&found) && !is_slow(&found, found.crossover_hz.map_or(0.0, |hz| lag(feature, hz, period)))
-    };
+    let is_good = |around: &Loop| judged(feature, &around.without_derivative()).is_good();
     (feature.kd > 0.0 && loops.iter().all(is_good)).then(|| (mode.place_of_gain(feature, "kd"), "0.0".to_owned()))
 }
 
 /// Returns the largest factor on the gains, up to a first one, with which the filters are quick enough for each loop.
-fn quick(mode: &ModeLaw<'_>, feature: &Feature, loops: &[Loop], first: f64) -> Option<f64> {
-    let period = mode.nodes.period();
-    let is_quick = |factor: f64| {
-        let found = loops.iter().map(|around| margins(&around.times(factor)));
-        found.into_iter().all(|found| {
-            let lag = found.crossover_hz.map_or(0.0, |hz| lag(feature, hz, period));
-            KEPT.holds(&found) && !is_slow(&found, lag)
-        })
-    };
+fn quick(feature: &Feature, loops: &[Loop], first: f64) -> Option<f64> {
+    let is_quick = |factor: f64| loops.iter().all(|around| judged(feature, &around.times(factor)).is_good());
     std::iter::successors(Some(first), |factor| Some(factor * 0.95)).take(40).find(|factor| is_quick(*factor))
 }
 
@@ -220,14 +227,14 @@ fn slow_filter(mode: &ModeLaw<'_>, feature: &Feature, contacts: &[Contact], slow
     let keys = ["time_constant_ms", "cutoff_hz", "window_ms", "window"];
     let key = keys.into_iter().find(|key| mode.nodes.number(node, key).is_some());
     let name = &feature.name;
-    let left = match slow.margins.phase_deg.filter(|_| slow.margins.is_stable) {
+    let left = match slow.judged.margins.phase_deg.filter(|_| slow.judged.margins.is_stable) {
         Some(phase) => format!("a phase margin of {}° is left", libm::floor(phase)),
         None => "the loop is unstable".into(),
     };
     let message = format!(
         "the filters of `{name}` take {:.0}° of the phase where the gain of its loop is 1, and {left} {}: `{}` delays it by \
          {:.0} ms",
-        slow.lag,
+        slow.judged.lag,
         over(slow.object),
         slowest.node,
         slowest.delay_s * 1e3
@@ -254,11 +261,8 @@ fn slow_filter(mode: &ModeLaw<'_>, feature: &Feature, contacts: &[Contact], slow
 fn faster(mode: &ModeLaw<'_>, feature: &Feature, contacts: &[Contact], i: usize) -> Option<f64> {
     let period = mode.nodes.period();
     let is_good = |feature: &Feature| {
-        let loops = contacts.iter().filter_map(|contact| Loop::over(feature, contact, period));
-        loops.map(|around| margins(&around)).all(|found| {
-            let is_fast = || found.crossover_hz.is_none_or(|hz| lag(feature, hz, period) <= MAX_LAG);
-            KEPT.holds(&found) && (is_fast() || found.phase_deg.is_none_or(|phase| phase >= GOOD_PHASE))
-        })
+        let mut loops = contacts.iter().filter_map(|contact| Loop::over(feature, contact, period));
+        loops.all(|around| judged(feature, &around).is_good())
     };
     let shares = std::iter::successors(Some(0.8), |share| Some(share * 0.8)).take(20);
     shares.into_iter().find(|share| {
