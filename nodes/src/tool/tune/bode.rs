@@ -8,7 +8,8 @@ use nalgebra::Complex;
 use tactflow_runtime::cli::svg::{INK, PlotAxis, STYLES, Svg};
 
 use super::experiment::Line;
-use super::{Tuned, TunedFeature};
+use super::propose::TunedFeature;
+use super::tuned::Tuned;
 use crate::tool::control::digits::or_none;
 use crate::tool::control::response::Loop;
 

@@ -6,9 +6,12 @@ use std::path::Path;
 use tactflow_runtime::cli::table;
 
 use super::cases::Stated;
+use super::identify::Identified;
+use super::propose::TunedFeature;
+use super::save;
 use super::step::Step;
 use super::trial::Held;
-use super::{Found, Tuned, TunedFeature, save};
+use super::tuned::Tuned;
 use crate::tool::control::digits::{or_none, rounded_to_three_digits};
 
 /// Columns of the table of answers.
@@ -29,7 +32,7 @@ pub(super) fn text(tuned: &Tuned) -> String {
     text
 }
 
-fn answers(found: &[Found]) -> String {
+fn answers(found: &[Identified]) -> String {
     let rows = found.iter().flat_map(|one| {
         one.fits.iter().map(|(component, fit)| {
             let (hz, damping) = fit.resonance.unzip();

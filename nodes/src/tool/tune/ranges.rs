@@ -3,7 +3,7 @@
 use tactflow_runtime::engine::Engine;
 use toml_edit::{InlineTable, Value};
 
-use super::TunedFeature;
+use super::propose::TunedFeature;
 
 /// Ends of the names of the gains that are tuned.
 const GAINS: [&str; 3] = [".kp", ".ki", ".kd"];

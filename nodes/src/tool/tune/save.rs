@@ -5,7 +5,8 @@ use tactflow_runtime::graph::Outline;
 use toml_edit::{Array, InlineTable, Value};
 
 use super::cases::Stated;
-use super::{TuneArgs, Tuned, experiment};
+use super::tuned::Tuned;
+use super::{TuneArgs, experiment};
 use crate::tool::control::contacts::{Answer, Contact};
 use crate::tool::guided::BenchFile;
 

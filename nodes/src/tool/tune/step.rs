@@ -3,7 +3,8 @@
 use serde::Serialize;
 use tactflow_runtime::graph::{Outline, OutlinedMode};
 
-use super::{TunedFeature, lift};
+use super::lift;
+use super::propose::TunedFeature;
 use crate::tool::control::law::setpoint;
 use crate::tool::control::settings::{Index, Nodes, mode_flag, toml};
 

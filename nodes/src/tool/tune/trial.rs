@@ -8,8 +8,9 @@ use tactflow_runtime::node::ScalarId;
 use tactflow_runtime::record::PortColumns;
 
 use super::course::Course;
+use super::propose::TunedFeature;
 use super::step::{self, Planned, Step};
-use super::{Stop, TunedFeature, experiment};
+use super::{Stop, experiment};
 
 /// How a task holds a feature.
 #[derive(Debug, Clone, PartialEq, Serialize)]

@@ -1,0 +1,151 @@
+//! How a feature answers the motion over one contact.
+
+use nalgebra::Complex;
+use serde::Serialize;
+use tactflow_runtime::cli::Shell;
+
+use super::Stop;
+use super::experiment::{Experiment, HALF, Line};
+use super::fit::{ENOUGH, Fit, fit};
+use super::ways::{Response, agreed};
+use crate::motion::COMPONENTS;
+use crate::tool::control::contacts::Answer;
+use crate::tool::control::digits::rounded_to_three_digits;
+use crate::tool::control::law::Feature;
+use crate::tool::control::response::Loop;
+
+/// The answer of a feature over one contact.
+#[derive(Debug, Serialize)]
+pub(super) struct Identified {
+    pub(super) object: String,
+    /// For each component that moves the feature: its name, and the fit.
+    pub(super) fits: Vec<(&'static str, Fit)>,
+    /// What was measured, for each component.
+    #[serde(skip)]
+    pub(super) lines: Vec<Vec<Line>>,
+    /// The answer to the largest motion as a multiple of that to the one before, if no two motions agree [1].
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(super) growth: Option<f64>,
+    /// Why there is no fit.
+    pub(super) refused: Option<String>,
+    /// Whether a test signal has ended the mode.
+    #[serde(skip)]
+    pub(super) is_lost: bool,
+}
+
+/// Part of the answer by geometry below which a contact sticks [1].
+const LEAST_SLIDE: f64 = 0.5;
+
+/// Part of the response that a fit may leave unexplained [1].
+const MAX_RESIDUAL: f64 = 0.3;
+/// The same for a place of which no two test signals say the same: each motion has another friction [1].
+const MAX_RESIDUAL_SLIDING: f64 = 0.2;
+
+/// Measures how a feature answers each component that moves it.
+pub(super) fn identify(
+    experiment: &Experiment<'_>,
+    object: &str,
+    period: f64,
+    shell: &Shell,
+) -> Result<Identified, Stop> {
+    let feature = experiment.feature;
+    let mut found = Identified {
+        object: object.to_owned(),
+        fits: Vec::new(),
+        lines: Vec::new(),
+        growth: None,
+        refused: None,
+        is_lost: false,
+    };
+    for component in (0..6).filter(|i| feature.column[*i] != 0.0) {
+        let response = agreed(&Experiment { component, ..experiment.clone() }, shell)?;
+        let is_lost = response.as_ref().err().is_some_and(|refusal| refusal.is_lost);
+        let fitted = response
+            .map_err(|refusal| refusal.why)
+            .and_then(|response| Ok((fitted(feature, component, period, &response)?, response)));
+        match fitted {
+            Ok((fit, Response { lines, growth })) => {
+                found.fits.push((COMPONENTS[component], fit));
+                found.lines.push(lines);
+                found.growth = growth.or(found.growth);
+            }
+            Err(why) => {
+                (found.refused, found.is_lost) = (Some(why), is_lost);
+                break;
+            }
+        }
+    }
+    Ok(found)
+}
+
+/// Fits the response to one component.
+///
+/// # Errors
+/// If noise or friction leave it unknown.
+fn fitted(feature: &Feature, component: usize, period: f64, response: &Response) -> Result<Fit, String> {
+    let quantity = quantity(feature);
+    let fit = fit(&response.lines, known(feature, component, period)).map_err(|few| {
+        let all = response.lines.len();
+        format!("only {few} of {all} frequencies stand out of the noise, and a fit needs {ENOUGH}")
+    })?;
+    let slides = response.growth.is_some() && Answer::of_geometry(&quantity).is_some();
+    let (most, also) = match slides {
+        true => (MAX_RESIDUAL_SLIDING, ", and no two test signals agree"),
+        false => (MAX_RESIDUAL, ""),
+    };
+    let percent = 100.0 * fit.residual;
+    if fit.residual > most {
+        return Err(format!(
+            "a gain, a resonance and a latency leave {percent:.0} % of the response unexplained{also}"
+        ));
+    }
+    if sticks(&quantity, component, &fit) {
+        return Err(format!("friction holds the contact: it follows {:.0} % of the motion", 100.0 * fit.gain.abs()));
+    }
+    Ok(fit)
+}
+
+/// Returns whether a feature follows a motion by less than half of what geometry says, or the wrong way.
+fn sticks(quantity: &str, component: usize, fit: &Fit) -> bool {
+    let slides = Answer::of_geometry(quantity).unwrap_or_default().row()[component];
+    slides != 0.0 && fit.gain / slides < LEAST_SLIDE
+}
+
+/// Returns the response of what the graph states, at half of the gains and for one component alone.
+pub(super) fn known(feature: &Feature, component: usize, period: f64) -> impl Fn(f64) -> Complex<f64> {
+    let around = Loop::new(feature, &Answer::default(), 0.0, period).times(HALF);
+    let column = feature.column[component];
+    move |omega| around.known(omega) * column
+}
+
+/// Returns the answer of a feature to all components. The resonance and the latency are those of the first one.
+///
+/// A contact that sticks follows a small motion only in part. It can slide at any time, so what geometry says counts if
+/// it is more.
+pub(super) fn answer(quantity: &str, fits: &[(&'static str, Fit)]) -> Answer {
+    let geometry = Answer::of_geometry(quantity).unwrap_or_default().row();
+    let mut answer = Answer::default();
+    for (component, fit) in fits {
+        let entry = match *component {
+            "vx" => &mut answer.vx,
+            "vy" => &mut answer.vy,
+            "vz" => &mut answer.vz,
+            "wx" => &mut answer.wx,
+            "wy" => &mut answer.wy,
+            _ => &mut answer.wz,
+        };
+        let index = COMPONENTS.iter().position(|name| name == component);
+        let slides = index.map_or(0.0, |i| geometry[i]);
+        *entry = Some(if slides.abs() > fit.gain.abs() { slides } else { rounded_to_three_digits(fit.gain) });
+    }
+    let Some((_, main)) = fits.first() else { return answer };
+    answer.resonance_hz = main.resonance.map(|(hz, _)| rounded_to_three_digits(hz));
+    answer.damping_ratio = main.resonance.map(|(_, damping)| rounded_to_three_digits(damping));
+    answer.latency_ms = Some((main.latency * 1e4).round() / 10.0);
+    answer
+}
+
+/// Returns the name of what a feature measures.
+pub(super) fn quantity(feature: &Feature) -> String {
+    feature.quantity().unwrap_or(&feature.name).to_owned()
+}

@@ -1,0 +1,143 @@
+//! The gains that are proposed for a feature, and how often it is measured for them.
+
+use std::ops::RangeInclusive;
+
+use serde::Serialize;
+use tactflow_runtime::cli::Shell;
+use tactflow_runtime::graph::{Outline, OutlinedMode};
+
+use super::Stop;
+use super::cases::Case;
+use super::experiment::{Experiment, HALF};
+use super::identify::{Identified, answer, identify, known, quantity};
+use crate::motion::COMPONENTS;
+use crate::tool::control::choose::{Wanted, factor};
+use crate::tool::control::contacts::Contact;
+use crate::tool::control::digits::{floored_to_two_digits, rounded_to_three_digits};
+use crate::tool::control::law::Feature;
+use crate::tool::control::margins::{Margins, margins};
+use crate::tool::control::response::Loop;
+
+/// One feature, over all contacts.
+#[derive(Debug, Serialize)]
+pub(super) struct TunedFeature {
+    pub(super) name: String,
+    /// The answers, for each contact.
+    pub(super) answers: Vec<Identified>,
+    /// Proportional, integral and derivative gain of the graph.
+    pub(super) old: [f64; 3],
+    /// The gains that are proposed, rounded down to two digits; `None` if the margins do not hold with any.
+    pub(super) new: Option<[f64; 3]>,
+    /// The margins of the new gains, for each contact.
+    pub(super) margins: Vec<Margins>,
+    #[serde(skip)]
+    pub(super) feature: Feature,
+    /// The loops with the new gains, or with those of the graph if there are no new ones, each with its contact.
+    #[serde(skip)]
+    pub(super) loops: Vec<(usize, Loop)>,
+}
+
+impl TunedFeature {
+    /// Returns the proposed gains as a multiple of those of the graph.
+    fn factor(&self) -> Option<f64> {
+        self.new.map(|new| new[0] / self.old[0])
+    }
+}
+
+/// Proposed gains, as a multiple of those of the graph, with which a loop is not measured again [1].
+const NEAR: RangeInclusive<f64> = 0.83..=3.0;
+/// Share of the proposed gains with which it is measured again [1].
+const QUARTER: f64 = 0.25;
+
+/// What is measured for each feature.
+pub(super) struct Measurement<'a> {
+    pub(super) shell: &'a Shell,
+    pub(super) outline: &'a Outline,
+    pub(super) mode: &'a OutlinedMode,
+    /// The node that adds the test signal to the motion.
+    pub(super) adder: &'a str,
+    pub(super) cases: &'a [Case],
+    pub(super) wanted: Wanted,
+}
+
+impl Measurement<'_> {
+    /// Measures a feature, again with other gains if the first ones lead it astray, and proposes gains. Returns the contacts
+    /// with its answers too.
+    pub(super) fn proposal(
+        &self,
+        feature: &Feature,
+        contacts: &[Contact],
+    ) -> Result<(TunedFeature, Vec<Contact>), Stop> {
+        let say = |gains: &str| self.shell.say_beside(&format!("`{}`: again, with {gains}", feature.name));
+        let mut found = self.measured(feature, contacts, HALF)?;
+        if found.0.answers.iter().any(|found| found.is_lost) {
+            // A loop that hardly holds the contact loses it with a test signal.
+            say("an eighth of its gains");
+            found = self.measured(feature, contacts, HALF * QUARTER)?;
+        }
+        // A stiff loop holds the contact against the test signal, and friction then hides more of the motion. A soft one
+        // has not settled when the signal begins.
+        if let Some(factor) = found.0.factor().filter(|factor| !NEAR.contains(factor)) {
+            say("a quarter of the gains that were found");
+            let again = self.measured(feature, contacts, QUARTER * factor)?;
+            found = if again.0.new.is_some() { again } else { found };
+        }
+        Ok(found)
+    }
+
+    /// Measures a feature over all contacts with a share of its gains, and proposes gains.
+    fn measured(
+        &self,
+        feature: &Feature,
+        contacts: &[Contact],
+        share: f64,
+    ) -> Result<(TunedFeature, Vec<Contact>), Stop> {
+        let Self { outline, mode, adder, .. } = *self;
+        let (catalogue, component, period) = (self.shell.catalogue(), 0, outline.period_s);
+        let mut contacts = contacts.to_vec();
+        let found = self.cases.iter().zip(&mut contacts).map(|(case, contact)| {
+            let request = &case.request;
+            let experiment = Experiment { catalogue, request, outline, mode, adder, feature, component, period, share };
+            let found = identify(&experiment, &case.object, period, self.shell)?;
+            if found.refused.is_none() {
+                let quantity = quantity(feature);
+                contact.features.insert(quantity.clone(), answer(&quantity, &found.fits));
+            }
+            Ok(found)
+        });
+        let found = found.collect::<Result<Vec<Identified>, Stop>>()?;
+        Ok((propose(feature.clone(), found, &contacts, self.wanted, period), contacts))
+    }
+}
+
+/// Returns the largest gains of a feature that keep the margins over all contacts.
+fn propose(
+    feature: Feature,
+    answers: Vec<Identified>,
+    contacts: &[Contact],
+    wanted: Wanted,
+    period: f64,
+) -> TunedFeature {
+    let old = [feature.kp, feature.ki, feature.kd];
+    let is_measured = answers.iter().all(|found| found.refused.is_none());
+    let loops = contacts.iter().enumerate();
+    let loops: Vec<(usize, Loop)> =
+        loops.filter_map(|(i, contact)| Some((i, Loop::over(&feature, contact, period)?))).collect();
+    // A fit smooths what friction does near the crossover, so the margins must hold for the measured response too.
+    let measured = |(i, around): &(usize, Loop)| match (&answers[*i].fits[..], &answers[*i].lines[..]) {
+        ([(component, fit)], [lines]) => {
+            let component = COMPONENTS.iter().position(|name| name == component)?;
+            Some(around.measured(fit.missed(lines, known(&feature, component, period))))
+        }
+        _ => None,
+    };
+    let each: Vec<Loop> = loops.iter().filter_map(measured).chain(loops.iter().map(|(_, one)| one.clone())).collect();
+    let factor = factor(&each, wanted).filter(|_| is_measured && loops.len() == contacts.len());
+    // Rounded down, so that the margins hold.
+    let factor = factor.map(|factor| floored_to_two_digits(feature.kp * factor) / feature.kp);
+    let new = factor.map(|factor| old.map(|gain| rounded_to_three_digits(gain * factor)));
+    let loops: Vec<(usize, Loop)> =
+        loops.into_iter().map(|(i, around)| (i, around.times(factor.unwrap_or(1.0)))).collect();
+    let margins = new.map(|_| loops.iter().map(|(_, around)| margins(around)).collect()).unwrap_or_default();
+    TunedFeature { name: feature.name.clone(), answers, old, new, margins, feature, loops }
+}
