@@ -7,8 +7,8 @@ use std::f64::consts::PI;
 use nalgebra::Complex;
 use tactflow_runtime::cli::svg::{INK, PlotAxis, STYLES, Svg};
 
-use super::experiment::Line;
 use super::propose::TunedFeature;
+use super::spectrum::Line;
 use super::tuned::Tuned;
 use crate::tool::control::digits::or_none;
 use crate::tool::control::response::Loop;

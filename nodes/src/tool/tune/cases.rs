@@ -6,7 +6,7 @@ use std::path::PathBuf;
 use tactflow_runtime::cli::Shell;
 use tactflow_runtime::graph::{Outline, Request, compile};
 
-use super::{TuneArgs, experiment};
+use super::{TuneArgs, signal};
 use crate::tool::control::contacts::{Contact, contacts};
 
 /// A bench, and the contacts that it states.
@@ -46,7 +46,7 @@ pub(super) fn cases(args: &TuneArgs, request: &Request, shell: &Shell) -> Result
         request.set.extend(also.cloned());
         let compiled = compile(shell.catalogue(), &request).map_err(|report| report.render(false))?;
         let outline = compiled.outline();
-        request.set.extend(experiment::long_enough(outline, experiment::duration(outline.period_s)));
+        request.set.extend(signal::long_enough(outline, signal::duration(outline.period_s)));
         let arm = arm_of(outline).unwrap_or_default();
         let stated = Stated { file: bench_file(outline), contacts: contacts(compiled.facts(), arm)? };
         let stem = stated.file.as_ref().and_then(|file| file.file_stem());

@@ -3,7 +3,7 @@
 use nalgebra::Complex;
 use serde::Serialize;
 
-use super::experiment::Line;
+use super::spectrum::Line;
 use crate::tool::control::response::arm;
 use crate::tool::control::shape::turn;
 

@@ -5,8 +5,9 @@ use serde::Serialize;
 use tactflow_runtime::cli::Shell;
 
 use super::Stop;
-use super::experiment::{Experiment, HALF, Line};
+use super::experiment::{Experiment, HALF};
 use super::fit::{ENOUGH, Fit, fit};
+use super::spectrum::Line;
 use super::ways::{Response, agreed};
 use crate::motion::COMPONENTS;
 use crate::tool::control::contacts::Answer;
@@ -58,7 +59,7 @@ pub(super) fn identify(
         is_lost: false,
     };
     for component in (0..6).filter(|i| feature.column[*i] != 0.0) {
-        let response = agreed(&Experiment { component, ..experiment.clone() }, shell)?;
+        let response = agreed(experiment, component, shell)?;
         let is_lost = response.as_ref().err().is_some_and(|refusal| refusal.is_lost);
         let fitted = response
             .map_err(|refusal| refusal.why)

@@ -5,12 +5,15 @@ mod cases;
 mod course;
 mod experiment;
 mod fit;
+mod gain_keys;
 mod identify;
 mod lift;
 mod page;
 mod propose;
 mod ranges;
 mod save;
+mod signal;
+mod spectrum;
 mod stay;
 mod step;
 mod target;
@@ -178,7 +181,7 @@ fn tune(args: &TuneArgs, shell: &Shell, request: &Request, outline: &Outline) ->
     let mut tuned = Tuned { mode: name, arm, wanted, contacts, benches, features, ranges, settled };
     for case in &cases {
         let mut request = case.request.clone();
-        request.set.extend(lift::settings(outline, mode, &adder, experiment::measured(outline.period_s)));
+        request.set.extend(lift::settings(outline, mode, &adder, signal::measured(outline.period_s)));
         // With another setting, the mode and its setpoints may be others.
         let outline = &case.outline;
         let mode = outline.modes.iter().find(|one| one.name == mode.name).unwrap_or(mode);

@@ -93,11 +93,11 @@ impl Measurement<'_> {
         share: f64,
     ) -> Result<(TunedFeature, Vec<Contact>), Stop> {
         let Self { outline, mode, adder, .. } = *self;
-        let (catalogue, component, period) = (self.shell.catalogue(), 0, outline.period_s);
+        let (catalogue, period) = (self.shell.catalogue(), outline.period_s);
         let mut contacts = contacts.to_vec();
         let found = self.cases.iter().zip(&mut contacts).map(|(case, contact)| {
             let request = &case.request;
-            let experiment = Experiment { catalogue, request, outline, mode, adder, feature, component, period, share };
+            let experiment = Experiment { catalogue, request, outline, mode, adder, feature, period, share };
             let found = identify(&experiment, &case.object, period, self.shell)?;
             if found.refused.is_none() {
                 let quantity = quantity(feature);

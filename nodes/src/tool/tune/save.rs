@@ -6,7 +6,7 @@ use toml_edit::{Array, InlineTable, Value};
 
 use super::cases::Stated;
 use super::tuned::Tuned;
-use super::{TuneArgs, experiment};
+use super::{TuneArgs, gain_keys};
 use crate::tool::control::contacts::{Answer, Contact};
 use crate::tool::guided::BenchFile;
 
@@ -21,7 +21,7 @@ pub(super) fn save(args: &TuneArgs, outline: &Outline, tuned: &Tuned, shell: &Sh
         let (Some(pid), Some(mode), Some(new)) = (&one.feature.pid, mode, one.new) else { continue };
         let keys = ["kp", "ki", "kd"].into_iter().zip(one.old).zip(new);
         for (key, gain) in keys.filter(|((_, old), new)| old != new).map(|((key, _), gain)| (key, gain)) {
-            let path = experiment::gain_key(pid, &one.name, key, mode);
+            let path = gain_keys::gain_key(pid, &one.name, key, mode);
             let path: Vec<&str> = path.split('.').collect();
             let Some((last, section)) = path.split_last() else { continue };
             graph.set(section, last, gain)?;

@@ -10,7 +10,7 @@ use tactflow_runtime::record::PortColumns;
 use super::course::Course;
 use super::propose::TunedFeature;
 use super::step::{self, Planned, Step};
-use super::{Stop, experiment};
+use super::{Stop, gain_keys, signal};
 
 /// How a task holds a feature.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -71,7 +71,7 @@ impl Trial<'_> {
         if changed.is_empty() {
             return Ok(Vec::new());
         }
-        let gains = |one: &&TunedFeature| experiment::gains(&one.feature, self.mode, one.new.unwrap_or(one.old));
+        let gains = |one: &&TunedFeature| gain_keys::gains(&one.feature, self.mode, one.new.unwrap_or(one.old));
         let new: Vec<String> = changed.iter().flat_map(gains).collect();
         let steps = step::plan(self.outline, self.mode, &changed);
         let [(old, _), (new, failure)] = [self.hold(&changed, &steps, &[])?, self.hold(&changed, &steps, &new)?];
@@ -101,9 +101,9 @@ impl Trial<'_> {
             PortColumns::find(engine.ports(), &port).ok_or_else(|| Stop::Refused(format!("no port is `{port}`")))
         });
         let ports: Vec<ScalarId> = ports.collect::<Result<_, _>>()?;
-        let settling = experiment::settling(period);
+        let settling = signal::settling(period);
         let mut course = Course::new(step::modes(self.mode, steps), settling);
-        let options = RunOptions { duration: Some(experiment::duration(period)), ..RunOptions::default() };
+        let options = RunOptions { duration: Some(signal::duration(period)), ..RunOptions::default() };
         let outcome = run(&mut engine, &options, &mut |engine| {
             let read = |port: &ScalarId| engine.bus().scalar(*port).unwrap_or(f64::NAN);
             course.see(engine.mode(), || ports.iter().map(read).collect());

@@ -3,8 +3,9 @@
 use tactflow_runtime::cli::Shell;
 
 use super::Stop;
-use super::experiment::{Answered, Experiment, Line};
+use super::experiment::{Answered, Experiment};
 use super::fit::ENOUGH;
+use super::spectrum::Line;
 
 /// Ways of a linear [m] and of an angular test signal [rad], one after the other.
 const WAYS: [[f64; 4]; 2] = [[0.3e-3, 1.2e-3, 2.4e-3, 4.8e-3], [0.01, 0.02, 0.04, 0.08]];
@@ -29,17 +30,21 @@ pub(super) struct Refusal {
     pub(super) is_lost: bool,
 }
 
-/// Moves further and further, as far as the task stays in its mode, and returns the response to the largest motions
-/// that agree. Friction hides a small motion, and gives two of them the same wrong response: no larger motion may have
-/// a larger one. If the last two only differ a little, the larger response counts, which has the smaller margins: a
+/// Moves further and further along a component, as far as the task stays in its mode, and returns the response to the
+/// largest motions that agree. Friction hides a small motion, and gives two of them the same wrong response: no larger
+/// motion may have a larger one. If the last two only differ a little, the larger response counts, which has the smaller margins: a
 /// contact may stiffen when it is pressed further, and press less when it is nearly left.
-pub(super) fn agreed(experiment: &Experiment<'_>, shell: &Shell) -> Result<Result<Response, Refusal>, Stop> {
+pub(super) fn agreed(
+    experiment: &Experiment<'_>,
+    component: usize,
+    shell: &Shell,
+) -> Result<Result<Response, Refusal>, Stop> {
     let mut runs: Vec<Vec<Line>> = Vec::new();
     let mut stopped = None;
-    let unit = if experiment.component < 3 { "m" } else { "rad" };
-    for way in WAYS[experiment.component / 3] {
+    let unit = if component < 3 { "m" } else { "rad" };
+    for way in WAYS[component / 3] {
         shell.say_beside(&format!("`{}`: a test signal of {way} {unit}", experiment.feature.name));
-        match experiment.run(way)? {
+        match experiment.run(component, way)? {
             Answered::Lines(lines) => runs.push(lines),
             Answered::Nothing(reason) => {
                 stopped = Some(format!("with a test signal of {way} {unit}, {reason}"));
@@ -61,7 +66,7 @@ pub(super) fn agreed(experiment: &Experiment<'_>, shell: &Shell) -> Result<Resul
         }
     }
     let is_lost = agree.is_none() && stopped.is_some();
-    let lighter = if experiment.component < 2 { "; a lighter press has less friction" } else { "" };
+    let lighter = if component < 2 { "; a lighter press has less friction" } else { "" };
     let why = match agree {
         Some(_) => format!("friction holds the contact back: only the largest test signal moves it{lighter}"),
         None => stopped.unwrap_or_else(|| {

@@ -1,0 +1,78 @@
+//! The test signal: sines, one after the other, and how long a run with them takes.
+
+use std::f64::consts::PI;
+
+use tactflow_runtime::graph::Outline;
+
+use super::lift;
+
+/// Frequencies of the test signal [Hz].
+const FREQUENCIES_HZ: [f64; 11] = [0.2, 0.35, 0.5, 0.7, 1.0, 1.4, 2.0, 2.8, 4.0, 5.6, 8.0];
+/// Time after the begin of the mode until the test signal begins [s].
+const BEGIN_S: f64 = 6.0;
+/// Time for the response to a frequency to become periodic [s], and at least one period.
+const SETTLING_S: f64 = 1.0;
+/// Time in which a frequency is measured [s], and at least three periods.
+const MEASURING_S: f64 = 2.0;
+/// Time for the approach [s].
+const APPROACH_S: f64 = 20.0;
+
+/// One sine of the test signal.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Sine {
+    /// Number of ticks in a period.
+    pub(super) ticks: usize,
+    /// Tick at which it begins, counted from the begin of the mode.
+    pub(super) begin: usize,
+    /// Number of periods for the response to settle.
+    pub(super) settling: usize,
+    /// Number of periods that are measured.
+    pub(super) measured: usize,
+}
+
+impl Sine {
+    /// Returns the sines of a test signal, one after the other, for ticks of `period` [s].
+    pub(super) fn all(period: f64) -> Vec<Self> {
+        let mut begin = (BEGIN_S / period).round() as usize;
+        let mut sine = |hz: f64| {
+            let ticks = (1.0 / (hz * period)).round().max(4.0) as usize;
+            let periods = |seconds: f64| (seconds / (ticks as f64 * period)).ceil() as usize;
+            let sine =
+                Self { ticks, begin, settling: periods(SETTLING_S).max(1), measured: periods(MEASURING_S).max(3) };
+            begin = sine.end();
+            sine
+        };
+        FREQUENCIES_HZ.map(&mut sine).into()
+    }
+
+    /// Returns the tick after its last one.
+    pub(super) const fn end(&self) -> usize {
+        self.begin + (self.settling + self.measured) * self.ticks
+    }
+
+    /// Returns its amplitude as a speed, for a way [m] or [rad].
+    pub(super) fn speed(&self, way: f64, fastest: f64, period: f64) -> f64 {
+        (2.0 * PI * way / (self.ticks as f64 * period)).min(fastest)
+    }
+}
+
+/// Returns the settings that let the simulated devices of a graph run for so long [s].
+pub(super) fn long_enough(outline: &Outline, seconds: f64) -> impl Iterator<Item = String> {
+    let limited = outline.devices.iter().filter(|device| device.settings.iter().any(|one| one.path == "for_s"));
+    limited.map(move |device| format!("devices.{}.for_s={seconds:?}", device.name))
+}
+
+/// Returns the number of ticks of `period` [s] in which a contact settles before it is measured.
+pub(super) fn settling(period: f64) -> usize {
+    Sine::all(period).first().map_or(0, |sine| sine.begin)
+}
+
+/// Returns how long the mode is measured, for ticks of `period` [s].
+pub(super) fn measured(period: f64) -> f64 {
+    Sine::all(period).last().map_or(0.0, |sine| sine.end() as f64 * period)
+}
+
+/// Returns how long a run takes at most, for ticks of `period` [s].
+pub(super) fn duration(period: f64) -> f64 {
+    APPROACH_S + measured(period) + lift::LASTS_S
+}
