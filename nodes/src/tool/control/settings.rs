@@ -30,6 +30,11 @@ impl<'a> Index<'a> {
         }
     }
 
+    /// Returns the outline of the graph.
+    pub(crate) const fn outline(&self) -> &'a Outline {
+        self.outline
+    }
+
     /// Returns the task that a port is part of, the longest name that fits; "" for the graph itself.
     pub(crate) fn task_of(&self, port: &str) -> &'a str {
         let ends = port.rmatch_indices('.').map(|(end, _)| &port[..end]);
@@ -152,10 +157,19 @@ pub(crate) fn source<'a>(node: &'a OutlinedBlock, input: &str) -> Option<&'a str
     node.wires.iter().find(|wire| wire.name == input).map(|wire| &*wire.source)
 }
 
-/// Returns the velocities of all arms: the name of each command, and the port behind it.
-pub(crate) fn commands(outline: &Outline) -> impl Iterator<Item = (String, &str)> {
-    let wires = outline.commands.iter().filter(|wire| wire.name.ends_with(".velocity"));
-    wires.map(|wire| (wire.name.clone(), &*wire.source))
+/// The velocity of an arm.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Command<'a> {
+    /// Name of the role of the arm.
+    pub(crate) arm: &'a str,
+    /// The port behind the command.
+    pub(crate) port: &'a str,
+}
+
+/// Returns the velocities of all arms.
+pub(crate) fn commands(outline: &Outline) -> impl Iterator<Item = Command<'_>> {
+    let wires = outline.commands.iter();
+    wires.filter_map(|wire| Some(Command { arm: wire.name.strip_suffix(".velocity")?, port: &wire.source }))
 }
 
 /// Returns the exits of a mode.

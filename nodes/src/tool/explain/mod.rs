@@ -15,7 +15,7 @@ use super::control::chain::{Limiter, chain};
 use super::control::collect::law;
 use super::control::contacts::contacts;
 use super::control::law::Law;
-use super::control::settings::{self, Ends, Index, Nodes};
+use super::control::settings::{Command, Ends, Index, Nodes, commands, ends};
 use stability::{Stability, stability};
 use touch::{Approach, approaches};
 
@@ -103,21 +103,22 @@ pub(super) fn run(args: ExplainArgs, shell: &Shell) -> Result<u8, u8> {
 
 fn explain(compiled: &Compiled, port: Option<&str>) -> Result<Explained, String> {
     let outline = compiled.outline();
-    let motions: Vec<(String, &str)> = match port {
-        Some(port) => vec![(port.to_owned(), port)],
-        None => settings::commands(outline).collect(),
+    let index = Index::new(outline);
+    let motions: Vec<Result<Motion, String>> = match port {
+        Some(port) => vec![motion(compiled, &index, port.to_owned(), Command { arm: "", port })],
+        None => commands(outline).map(|one| motion(compiled, &index, format!("{}.velocity", one.arm), one)).collect(),
     };
     if motions.is_empty() {
         return Err("no role is an arm, so nothing moves: name a port that carries a twist".into());
     }
-    let index = Index::new(outline);
-    let motions = motions.into_iter().map(|(of, port)| motion(compiled, &index, of, port));
-    Ok(Explained { period_s: outline.period_s, motions: motions.collect::<Result<_, _>>()? })
+    Ok(Explained { period_s: outline.period_s, motions: motions.into_iter().collect::<Result<_, _>>()? })
 }
 
-fn motion(compiled: &Compiled, index: &Index<'_>, of: String, port: &str) -> Result<Motion, String> {
+/// Returns what a port carries to an arm, with the contacts that the bench declares for it: those of "" are none.
+fn motion(compiled: &Compiled, index: &Index<'_>, of: String, command: Command<'_>) -> Result<Motion, String> {
+    let Command { arm, port } = command;
     let (limits, twist) = chain(&Nodes::new(index, None), port)?;
-    let declared = contacts(compiled.facts(), of.split('.').next().unwrap_or_default())?;
+    let declared = contacts(compiled.facts(), arm)?;
     let modes = index.modes(index.task_of(port)).into_iter().map(|mode| {
         let nodes = Nodes::new(index, mode);
         let law = law(&nodes, &twist);
@@ -126,7 +127,7 @@ fn motion(compiled: &Compiled, index: &Index<'_>, of: String, port: &str) -> Res
             loops: stability(&declared, &law, nodes.period()),
             approaches: approaches(&nodes, &limits, &law, &declared),
             law,
-            ends: mode.map(settings::ends).unwrap_or_default(),
+            ends: mode.map(ends).unwrap_or_default(),
         })
     });
     let modes = modes.collect::<Result<_, String>>()?;

@@ -9,14 +9,16 @@ use tactflow_runtime::source::{Item, Table, Value};
 use super::mode_law::ModeLaw;
 use crate::tool::control::chain::{Limiter, chain};
 use crate::tool::control::collect::law;
-use crate::tool::control::contacts::{Contact, contacts};
+use crate::tool::control::contacts::Contact;
 use crate::tool::control::filters::way;
 use crate::tool::control::law::Feature;
-use crate::tool::control::settings::{Index, Nodes};
+use crate::tool::control::settings::{Command, Index, Nodes};
 
 /// An arm and what moves it.
 pub(super) struct Arm<'a> {
     pub(super) outline: &'a Outline,
+    /// Name of its role.
+    pub(super) name: &'a str,
     /// Task of the arm, "" for the graph itself.
     pub(super) task: &'a str,
     pub(super) limits: Vec<Limiter>,
@@ -36,21 +38,21 @@ pub(super) fn carried(outline: &Outline) -> BTreeSet<&str> {
 }
 
 impl<'a> Arm<'a> {
-    /// Returns what moves an arm; `None` if a chain of limiters leads to no node.
+    /// Returns what moves an arm that touches these contacts; `None` if a chain of limiters leads to no node.
     pub(super) fn of(
-        (outline, index, carried): (&'a Outline, &'a Index<'a>, &'a BTreeSet<&'a str>),
-        facts: &[(String, toml::Value)],
-        (command, port): (&str, &str),
+        index: &'a Index<'a>,
+        carried: &'a BTreeSet<&'a str>,
+        command: Command<'a>,
+        contacts: Vec<Contact>,
     ) -> Option<Self> {
-        let (limits, twist) = chain(&Nodes::new(index, None), port).ok()?;
-        let task = index.task_of(port);
+        let (limits, twist) = chain(&Nodes::new(index, None), command.port).ok()?;
+        let task = index.task_of(command.port);
         let modes = index.modes(task).into_iter().map(|mode| {
             let nodes = Nodes::new(index, mode);
             ModeLaw { mode, carried, nodes, law: law(&nodes, &twist) }
         });
         let modes = modes.collect();
-        let contacts = contacts(facts, command.split('.').next()?).unwrap_or_default();
-        Some(Self { outline, task, limits, twist, contacts, modes })
+        Some(Self { outline: index.outline(), name: command.arm, task, limits, twist, contacts, modes })
     }
 
     /// Returns the objects of a simulated bench.

@@ -11,7 +11,8 @@ use crate::tool::control::contacts::Answer;
 use crate::tool::control::digits::to_two_digits;
 use crate::tool::control::law::Feature;
 
-pub(super) fn check(arm: &Arm<'_>, found: &mut Diagnostics) {
+pub(super) fn check(arm: &Arm<'_>) -> Diagnostics {
+    let mut found = Diagnostics::new();
     for mode in &arm.modes {
         found.extend(mode.moving().filter_map(|feature| unfiltered(mode, feature)));
         found.extend(mode.moving().filter_map(|feature| slow(arm, mode, feature)));
@@ -19,6 +20,7 @@ pub(super) fn check(arm: &Arm<'_>, found: &mut Diagnostics) {
     }
     let first = arm.modes.first().into_iter();
     found.extend(first.flat_map(|mode| mode.law.features.iter().filter_map(|feature| resting(arm, mode, feature))));
+    found
 }
 
 /// Returns the warning about a feature that has no gain in any mode. One that rests in some modes is right.

@@ -17,8 +17,8 @@ const ALONG: f64 = 0.35;
 /// Largest part of an axis along z of the sensor with which it lies in the plane of the pad [1].
 const LYING: f64 = 0.5;
 
-pub(super) fn check(arm: &Arm<'_>, found: &mut Diagnostics) {
-    found.extend(arm.modes.iter().filter_map(|mode| along_line(arm, mode)));
+pub(super) fn check(arm: &Arm<'_>) -> Diagnostics {
+    arm.modes.iter().filter_map(|mode| along_line(arm, mode)).collect()
 }
 
 /// Returns the warning about a position that a mode controls along a line, while it moves the sensor along this line, or

@@ -54,36 +54,40 @@ use std::collections::BTreeSet;
 use tactflow_runtime::graph::Outline;
 use tactflow_runtime::source::{Code, Diagnostics};
 
+use super::control::contacts::contacts;
 use super::control::settings::{Index, commands};
 use arm::{Arm, carried};
 use mode_law::ModeLaw;
 
+/// The checks of an arm, in the order of their warnings.
+const CHECKS: [fn(&Arm<'_>) -> Diagnostics; 10] = [
+    unread::misnamed,
+    touches,
+    reach::check,
+    lines::check,
+    opposed::check,
+    recovery::check,
+    presence::check,
+    columns,
+    gains::check,
+    stability::check,
+];
+
 /// Returns the warnings about the control law of a graph.
 pub(crate) fn lint(outline: &Outline, facts: &[(String, toml::Value)]) -> Diagnostics {
-    let commands: Vec<(String, &str)> = commands(outline).collect();
-    if commands.is_empty() {
+    if commands(outline).next().is_none() {
         return Diagnostics::new();
     }
     let index = Index::new(outline);
     let carried = carried(outline);
     let mut found = Diagnostics::new();
-    for (command, port) in &commands {
-        let name = command.split('.').next().unwrap_or_default();
-        found.extend(unread::check(outline, facts, name));
-        let Some(arm) = Arm::of((outline, &index, &carried), facts, (command, port)) else { continue };
-        found.extend(unread::misnamed(outline, &arm, name));
-        let before = found.len();
-        found.extend(contacts(&arm));
-        reach::check(&arm, &mut found);
-        lines::check(&arm, &mut found);
-        opposed::check(&arm, &mut found);
-        recovery::check(&arm, &mut found);
-        presence::check(&arm, &mut found);
-        found.extend(columns(&arm));
-        gains::check(&arm, &mut found);
-        stability::check(&arm, &mut found);
-        let of_arm = found.split_off(before);
-        found.extend(without_consequences(of_arm));
+    for command in commands(outline) {
+        let contacts = contacts(facts, command.arm).unwrap_or_else(|why| {
+            found.push(unread::check(outline, command.arm, why));
+            Vec::new()
+        });
+        let Some(arm) = Arm::of(&index, &carried, command, contacts) else { continue };
+        found.extend(without_consequences(CHECKS.iter().flat_map(|check| check(&arm)).collect()));
     }
     // Several modes, and several parts of the same file, read the same number.
     let mut seen = BTreeSet::new();
@@ -92,7 +96,7 @@ pub(crate) fn lint(outline: &Outline, facts: &[(String, toml::Value)]) -> Diagno
 }
 
 /// Returns the warnings about modes that lose their contact, or that never touch.
-fn contacts(arm: &Arm<'_>) -> Diagnostics {
+fn touches(arm: &Arm<'_>) -> Diagnostics {
     arm.modes.iter().flat_map(|mode| [rolling::check(arm, mode), approach::check(arm, mode)]).flatten().collect()
 }
 

@@ -10,13 +10,15 @@ use crate::motion::COMPONENTS;
 use crate::tool::control::exits::Exit;
 use crate::tool::control::law::{Feature, Guidance};
 
-pub(super) fn check(arm: &Arm<'_>, found: &mut Diagnostics) {
+pub(super) fn check(arm: &Arm<'_>) -> Diagnostics {
+    let mut found = Diagnostics::new();
     for mode in &arm.modes {
         let contradiction = retreat(mode).or_else(|| held(mode)).or_else(|| push(arm, mode));
         found.extend(
             contradiction.or_else(|| pressed(arm, mode)).or_else(|| dragged(arm, mode)).or_else(|| contended(mode)),
         );
     }
+    found
 }
 
 /// Returns the warning about a force that is controlled while the sensor moves away from the object: the contact does not

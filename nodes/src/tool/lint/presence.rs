@@ -9,7 +9,8 @@ use crate::tool::control::filters::way;
 use crate::tool::control::law::Feature;
 use crate::tool::control::settings::source;
 
-pub(super) fn check(arm: &Arm<'_>, found: &mut Diagnostics) {
+pub(super) fn check(arm: &Arm<'_>) -> Diagnostics {
+    let mut found = Diagnostics::new();
     found.extend(arm.outline.nodes.iter().filter_map(|node| rate(arm, node)));
     // A feature that another mode lets pass is meant for that mode.
     let passes = |wanted: &Feature| {
@@ -26,6 +27,7 @@ pub(super) fn check(arm: &Arm<'_>, found: &mut Diagnostics) {
             found.push(Diagnostic::new(Code::UnusedColumn, mode.place_of_column(feature), message).help(help));
         }
     }
+    found
 }
 
 /// Returns the warning about a turning rate that something reads, where nothing says how the sensor moves along the line.

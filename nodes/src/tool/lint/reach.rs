@@ -11,7 +11,8 @@ use crate::tool::control::exits::Exit;
 use crate::tool::control::law::Feature;
 use crate::tool::control::settings::source;
 
-pub(super) fn check(arm: &Arm<'_>, found: &mut Diagnostics) {
+pub(super) fn check(arm: &Arm<'_>) -> Diagnostics {
+    let mut found = Diagnostics::new();
     for mode in &arm.modes {
         found.extend(mode.moving().filter_map(|feature| unreachable_setpoint(arm, mode, feature)));
         found.extend(mode.moving().filter_map(|feature| always_resting(arm, mode, feature)));
@@ -19,6 +20,7 @@ pub(super) fn check(arm: &Arm<'_>, found: &mut Diagnostics) {
         found.extend(exit_bounds(arm, mode));
     }
     found.extend(arm.modes.first().into_iter().flat_map(|mode| thresholds(arm, mode)));
+    found
 }
 
 /// Parameters of nodes that need a force, by their type.

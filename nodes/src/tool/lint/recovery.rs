@@ -19,14 +19,15 @@ impl ModeLaw<'_> {
     }
 }
 
-pub(super) fn check(arm: &Arm<'_>, found: &mut Diagnostics) {
+pub(super) fn check(arm: &Arm<'_>) -> Diagnostics {
+    let mut found = Diagnostics::new();
     let task = arm.outline.tasks.iter().find(|task| task.name == arm.task);
     let settings = task.map_or(&arm.outline.settings, |task| &task.settings);
     let start = settings.iter().find(|setting| setting.path == "start").and_then(|start| start.value.as_str());
-    let Some(start) = start else { return };
+    let Some(start) = start else { return found };
     let first = search(arm, start, &BTreeSet::new());
     let first_speed = fastest(arm, &first, |mode| mode.approach()).filter(|(_, speed)| *speed > 0.0);
-    let Some((slow, first_speed)) = first_speed else { return };
+    let Some((slow, first_speed)) = first_speed else { return found };
     for mode in &arm.modes {
         let exits = mode.lost().filter_map(|exit| Some((exit, exit.to()?)));
         found.extend(exits.filter(|(_, to)| !first.contains(to)).filter_map(|(exit, to)| {
@@ -38,6 +39,7 @@ pub(super) fn check(arm: &Arm<'_>, found: &mut Diagnostics) {
             (again > first_speed * (1.0 + 1e-9)).then(|| report(exit, (fast, again, is_beside), (slow, first_speed)))
         }));
     }
+    found
 }
 
 /// Returns the modes from one on in which the task has no contact: up to those that begin with one or that a lost contact

@@ -69,7 +69,8 @@ struct Found<'a> {
     judged: Judged,
 }
 
-pub(super) fn check(arm: &Arm<'_>, found: &mut Diagnostics) {
+pub(super) fn check(arm: &Arm<'_>) -> Diagnostics {
+    let mut found = Diagnostics::new();
     let geometry = [Contact { object: String::new(), latency_ms: 0.0, features: BTreeMap::new() }];
     let contacts = if arm.contacts.is_empty() { &geometry[..] } else { &arm.contacts[..] };
     // Most modes have the same loops.
@@ -83,6 +84,7 @@ pub(super) fn check(arm: &Arm<'_>, found: &mut Diagnostics) {
             }
         }
     }
+    found
 }
 
 /// Returns whether a loop has the largest gain of those that answer its measurement together: the first one of equal

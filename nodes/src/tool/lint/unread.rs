@@ -9,22 +9,20 @@ use super::arm::Arm;
 use crate::tool::control::contacts::{Contact, contacts};
 use crate::tool::control::law::Feature;
 
-/// Returns the warning about the contacts of an arm.
-pub(super) fn check(outline: &Outline, facts: &[(String, toml::Value)], arm: &str) -> Option<Diagnostic> {
-    let why = contacts(facts, arm).err()?;
+/// Returns the warning about the contacts of an arm that cannot be read, and why.
+pub(super) fn check(outline: &Outline, arm: &str, why: String) -> Diagnostic {
     let name = format!("{arm}.contacts");
     let value = outline.facts.iter().find(|(fact, _)| *fact == name).map(|(_, value)| value);
     let place = value.map_or(NO_SPAN, |value| place(&name, arm, value, &why));
     let message = format!("no loop of `{arm}` is checked over a contact, because its contacts cannot be read");
-    Some(Diagnostic::new(Code::UnusualValue, place, message).help(why))
+    Diagnostic::new(Code::UnusualValue, place, message).help(why)
 }
 
 /// Returns the warnings about features that the contacts of an arm call otherwise than their ports are called: as the
 /// graph calls them, or misspelt.
-pub(super) fn misnamed(outline: &Outline, arm: &Arm<'_>, name: &str) -> Diagnostics {
-    let Some((_, value)) = outline.facts.iter().find(|(fact, _)| *fact == format!("{name}.contacts")) else {
-        return Diagnostics::new();
-    };
+pub(super) fn misnamed(arm: &Arm<'_>) -> Diagnostics {
+    let (outline, fact) = (arm.outline, format!("{}.contacts", arm.name));
+    let Some((_, value)) = outline.facts.iter().find(|(name, _)| *name == fact) else { return Diagnostics::new() };
     let is_port = |name: &str| {
         let mut ports = outline.nodes.iter().flat_map(|node| &node.outputs);
         ports.any(|port| port.name.rsplit('.').next() == Some(name))

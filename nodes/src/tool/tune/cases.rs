@@ -8,6 +8,7 @@ use tactflow_runtime::graph::{Outline, Request, compile};
 
 use super::{TuneArgs, signal};
 use crate::tool::control::contacts::{Contact, contacts};
+use crate::tool::control::settings::commands;
 
 /// A bench, and the contacts that it states.
 #[derive(Debug, Clone, PartialEq)]
@@ -17,8 +18,8 @@ pub(super) struct Stated {
 }
 
 /// Returns the name of the role of the first arm.
-pub(super) fn arm_of(outline: &Outline) -> Option<&str> {
-    outline.commands.iter().find_map(|wire| wire.name.strip_suffix(".velocity"))
+fn arm_of(outline: &Outline) -> Option<&str> {
+    commands(outline).next().map(|command| command.arm)
 }
 
 /// What is measured: a graph on a bench, with a setting.

@@ -32,8 +32,8 @@ use super::arguments::{may_draw, write};
 use super::control::chain::chain;
 use super::control::choose::Wanted;
 use super::control::contacts::Contact;
-use super::control::settings::{self, Index, Nodes};
-use cases::{Case, arm_of, cases};
+use super::control::settings::{Index, Nodes, commands};
+use cases::{Case, cases};
 use propose::Measurement;
 use ranges::Range;
 use target::{adder, controlled};
@@ -160,9 +160,9 @@ fn writable(path: &Path) -> Result<(), String> {
 
 /// Measures the features of one mode, proposes gains, and tries them.
 fn tune(args: &TuneArgs, shell: &Shell, request: &Request, outline: &Outline) -> Result<Tuned, Stop> {
-    let (_, port) = settings::commands(outline).next().ok_or("no role is an arm, so nothing moves".to_owned())?;
+    let command = commands(outline).next().ok_or("no role is an arm, so nothing moves".to_owned())?;
     let index = Index::new(outline);
-    let (_, twist) = chain(&Nodes::new(&index, None), port)?;
+    let (_, twist) = chain(&Nodes::new(&index, None), command.port)?;
     let (mode, controlled) = controlled(args, &index, &twist)?;
     let adder = adder(&index, &twist)?;
     let wanted = Wanted { peak: args.peak, gain_db: args.gain_margin, phase_deg: args.phase_margin };
@@ -175,7 +175,7 @@ fn tune(args: &TuneArgs, shell: &Shell, request: &Request, outline: &Outline) ->
         contacts = answered;
         features.push(found);
     }
-    let arm = arm_of(outline).unwrap_or_default().to_owned();
+    let arm = command.arm.to_owned();
     let benches = cases.iter().map(|case| case.stated.clone()).collect();
     let (name, ranges, settled) = (mode.name.clone(), Vec::new(), Vec::new());
     let mut tuned = Tuned { mode: name, arm, wanted, contacts, benches, features, ranges, settled };
