@@ -93,6 +93,16 @@ impl Answer {
 }
 
 impl Contact {
+    /// Returns a contact of which nothing is measured; that with no object stands for geometry alone.
+    pub(crate) const fn unmeasured(object: String) -> Self {
+        Self { object, latency_ms: 0.0, features: BTreeMap::new() }
+    }
+
+    /// Returns the name of the object; `None` where geometry alone says how features answer.
+    pub(crate) fn name(&self) -> Option<&str> {
+        Some(&*self.object).filter(|object| !object.is_empty())
+    }
+
     /// Returns whether geometry alone says how a feature answers: the bench states neither a resonance nor a latency.
     pub(crate) fn is_by_geometry(&self, feature: &str) -> bool {
         let stated = self.features.get(feature);

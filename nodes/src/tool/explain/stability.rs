@@ -1,7 +1,5 @@
 //! The margins of the loops of one mode.
 
-use std::collections::BTreeMap;
-
 use serde::Serialize;
 
 use crate::tool::control::contacts::Contact;
@@ -26,12 +24,12 @@ pub(super) struct Stability {
 
 /// Returns the margins of all features that a law controls, with the contacts that the bench declares for the arm.
 pub(super) fn stability(declared: &[Contact], law: &Law, period: f64) -> Vec<Stability> {
-    let alone = [Contact { object: String::new(), latency_ms: 0.0, features: BTreeMap::new() }];
+    let alone = [Contact::unmeasured(String::new())];
     let declared = if declared.is_empty() { &alone[..] } else { declared };
     let controlled: Vec<&Feature> = law.features.iter().filter(|feature| feature.moves()).collect();
     let loops = declared.iter().flat_map(|contact| {
         controlled.iter().map(|feature| Stability {
-            object: Some(contact.object.clone()).filter(|object| !object.is_empty()),
+            object: contact.name().map(str::to_owned),
             feature: feature.name.clone(),
             by_geometry: feature.quantity().is_some_and(|quantity| contact.is_by_geometry(quantity)),
             is_unknown: feature.schedules.iter().any(|schedule| schedule.nominal.is_none()),

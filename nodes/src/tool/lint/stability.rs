@@ -1,7 +1,7 @@
 //! Loops that are near instability over a contact, and filters that take their margin.
 
 use std::cmp::Ordering;
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeSet;
 use std::ops::Range;
 
 use tactflow_runtime::source::{Code, Diagnostic, Diagnostics, Edit};
@@ -65,13 +65,13 @@ fn judged(feature: &Feature, around: &Loop) -> Judged {
 
 /// A loop over a contact that was not ample.
 struct Found<'a> {
-    object: &'a str,
+    object: Option<&'a str>,
     judged: Judged,
 }
 
 pub(super) fn check(arm: &Arm<'_>) -> Diagnostics {
     let mut found = Diagnostics::new();
-    let geometry = [Contact { object: String::new(), latency_ms: 0.0, features: BTreeMap::new() }];
+    let geometry = [Contact::unmeasured(String::new())];
     let contacts = if arm.contacts.is_empty() { &geometry[..] } else { &arm.contacts[..] };
     // Most modes have the same loops.
     let mut seen = BTreeSet::new();
@@ -123,7 +123,7 @@ fn judge(mode: &ModeLaw<'_>, feature: &Feature, contacts: &[Contact]) -> Option<
     let all: Vec<Found<'_>> = loops
         .iter()
         .filter(|(_, around)| !AMPLE.holds(&rough_margins(around)))
-        .map(|(contact, around)| Found { object: &contact.object, judged: judged(feature, around) })
+        .map(|(contact, around)| Found { object: contact.name(), judged: judged(feature, around) })
         .collect();
     let peak = |found: &&Found<'_>| match found.judged.margins {
         Margins { is_stable: true, peak_sensitivity, .. } => peak_sensitivity,
@@ -143,8 +143,8 @@ fn judge(mode: &ModeLaw<'_>, feature: &Feature, contacts: &[Contact]) -> Option<
 }
 
 /// Returns how a message names a contact.
-fn over(object: &str) -> String {
-    if object.is_empty() { "by geometry alone".into() } else { format!("over `{object}`") }
+fn over(object: Option<&str>) -> String {
+    object.map_or_else(|| "by geometry alone".into(), |object| format!("over `{object}`"))
 }
 
 /// Returns the margins of a loop for a message.

@@ -1,6 +1,5 @@
 //! What is measured: the graph on each bench, and with each setting.
 
-use std::collections::BTreeMap;
 use std::path::PathBuf;
 
 use tactflow_runtime::cli::Shell;
@@ -33,7 +32,7 @@ pub(super) struct Case {
 impl Case {
     /// Returns its contact, whose features are not known yet.
     pub(super) fn contact(&self) -> Contact {
-        Contact { object: self.object.clone(), latency_ms: 0.0, features: BTreeMap::new() }
+        Contact::unmeasured(self.object.clone())
     }
 }
 
