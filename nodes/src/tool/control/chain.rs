@@ -2,7 +2,7 @@
 
 use serde::Serialize;
 
-use super::settings::{Nodes, source, toml};
+use super::nodes::{Nodes, source, toml};
 
 /// A node between the twist of a task and the command.
 #[derive(Debug, Serialize)]

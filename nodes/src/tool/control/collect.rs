@@ -6,7 +6,7 @@ use tactflow_runtime::signal::{Pose, Twist};
 
 use super::filters::Filter;
 use super::law::{Constant, Feature, Guidance, Law, feature};
-use super::settings::{Nodes, source};
+use super::nodes::{Nodes, source};
 use super::shape::Shape;
 use crate::motion::COMPONENTS;
 use crate::motion::adjoint::adjoint;

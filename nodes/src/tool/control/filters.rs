@@ -3,7 +3,7 @@
 use serde::Serialize;
 use tactflow_runtime::graph::OutlinedBlock;
 
-use super::settings::{Nodes, source};
+use super::nodes::{Nodes, source};
 use super::shape::Shape;
 
 /// A filter of a feature.

@@ -5,8 +5,8 @@ use tactflow_runtime::graph::OutlinedBlock;
 
 use super::contacts::Contact;
 use super::filters::{Filter, way};
+use super::nodes::{Nodes, source};
 use super::schedule::Schedule;
-use super::settings::{Nodes, source};
 
 /// What a twist is made of.
 #[derive(Debug, Default, Serialize)]

@@ -122,7 +122,7 @@ impl Loop {
 
     /// Returns L at a circular frequency [rad/s].
     pub(crate) fn open(&self, omega: f64) -> Complex<f64> {
-        let model = self.known(omega) * arm(omega, self.resonance) * turn(omega * self.latency) * self.gain;
+        let model = self.known(omega) * resonance(omega, self.resonance) * turn(omega * self.latency) * self.gain;
         let beside: Complex<f64> = self.beside.iter().map(|other| other.open(omega)).sum();
         model * between(&self.measured, omega) + beside
     }
@@ -160,8 +160,8 @@ fn travel(omega: f64, period: f64) -> Complex<f64> {
 }
 
 /// Returns the response of a resonance with its circular frequency [rad/s] and damping ratio.
-pub(crate) fn arm(omega: f64, resonance: Option<(f64, f64)>) -> Complex<f64> {
-    let Some((own, damping)) = resonance else { return Complex::from(1.0) };
+pub(crate) fn resonance(omega: f64, own: Option<(f64, f64)>) -> Complex<f64> {
+    let Some((own, damping)) = own else { return Complex::from(1.0) };
     let ratio = omega / own;
     Complex::from(1.0) / Complex::new(1.0 - ratio * ratio, 2.0 * damping * ratio)
 }

@@ -5,7 +5,7 @@ use tactflow_runtime::graph::OutlinedBlock;
 
 use super::contacts::Answer;
 use super::filters::way;
-use super::settings::{Nodes, source};
+use super::nodes::{Nodes, source};
 
 /// Smallest and largest factor of a `gain_schedule` that states none [1].
 const DEFAULT_FACTORS: [f64; 2] = [0.2, 1.0];

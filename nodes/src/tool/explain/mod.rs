@@ -1,8 +1,8 @@
 //! `tactflow explain`: what moves the arm in each mode, in numbers.
 
+mod approaches;
 mod page;
 mod stability;
-mod touch;
 
 use std::path::PathBuf;
 
@@ -15,9 +15,9 @@ use super::control::chain::{Limiter, chain};
 use super::control::collect::law;
 use super::control::contacts::contacts;
 use super::control::law::Law;
-use super::control::settings::{Command, Ends, Index, Nodes, commands, ends};
+use super::control::nodes::{Command, Ends, Index, Nodes, commands, ends};
+use approaches::{Approach, approaches};
 use stability::{Stability, stability};
-use touch::{Approach, approaches};
 
 /// Print what moves the arm in each mode: gains, limits and delays
 #[derive(clap::Parser)]

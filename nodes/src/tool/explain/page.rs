@@ -5,8 +5,8 @@ use std::path::Path;
 
 use tactflow_runtime::cli::table;
 
+use super::approaches::Approach;
 use super::stability::Stability;
-use super::touch::Approach;
 use super::{Explained, ModeLaw, Motion};
 use crate::motion::COMPONENTS;
 use crate::tool::control::digits::or_none;

@@ -12,7 +12,7 @@ use crate::tool::control::collect::law;
 use crate::tool::control::contacts::Contact;
 use crate::tool::control::filters::way;
 use crate::tool::control::law::Feature;
-use crate::tool::control::settings::{Command, Index, Nodes};
+use crate::tool::control::nodes::{Command, Index, Nodes};
 
 /// An arm and what moves it.
 pub(super) struct Arm<'a> {

@@ -35,7 +35,7 @@ fn resting(arm: &Arm<'_>, mode: &ModeLaw<'_>, feature: &Feature) -> Option<Diagn
 }
 
 /// Gain of a loop that needs a minute for two thirds of an error [1/s].
-const SLOW: f64 = 1.0 / 60.0;
+const MIN_LOOP_GAIN: f64 = 1.0 / 60.0;
 
 /// Returns the warning about a loop that hardly corrects an error: its column is in another unit, or its control has a
 /// limit that is too small.
@@ -44,7 +44,7 @@ fn slow(arm: &Arm<'_>, mode: &ModeLaw<'_>, feature: &Feature) -> Option<Diagnost
     let gain = largest_gain(arm, feature, quantity)?;
     let rate = feature.kp * feature.largest_schedule() * gain;
     let is_alone = feature.kp > 0.0 && feature.ki == 0.0 && feature.beside.is_empty();
-    if rate >= SLOW || !is_alone {
+    if rate >= MIN_LOOP_GAIN || !is_alone {
         return limited(mode, feature, quantity, gain);
     }
     let (name, time) = (&feature.name, (1.0 / rate).round());
@@ -76,7 +76,7 @@ fn limited(mode: &ModeLaw<'_>, feature: &Feature, quantity: &str, gain: f64) -> 
     };
     let limit = mode.gain(feature, "limit")?;
     let time = usual / (limit * gain);
-    if time * SLOW <= 1.0 {
+    if time * MIN_LOOP_GAIN <= 1.0 {
         return None;
     }
     let (name, place) = (&feature.name, mode.place_of_gain(feature, "limit"));

@@ -1,7 +1,7 @@
 //! What the nodes that guide an arm by a law of their own do with it, by their types.
 
 use crate::tool::control::law::Guidance;
-use crate::tool::control::settings::{Nodes, source};
+use crate::tool::control::nodes::{Nodes, source};
 
 /// Types that guide the sensor along the object, and do not press.
 const LIGHT: [&str; 6] = ["scan_guide", "ridge_guide", "hold_pose", "follow_path", "follow_surface", "park"];

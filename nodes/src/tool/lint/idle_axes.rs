@@ -10,7 +10,7 @@ use super::mode_law::ModeLaw;
 use crate::motion::COMPONENTS;
 use crate::tool::control::collect::{law, projectors};
 use crate::tool::control::law::Law;
-use crate::tool::control::settings::source;
+use crate::tool::control::nodes::source;
 
 /// Returns the warnings about components that a projector selects and that nothing moves.
 pub(super) fn check<'a>(arm: &Arm<'a>, mode: &ModeLaw<'a>) -> Diagnostics {

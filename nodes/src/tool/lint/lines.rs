@@ -49,7 +49,7 @@ fn along_line(arm: &Arm<'_>, mode: &ModeLaw<'_>) -> Option<Diagnostic> {
     };
     let message = format!(
         "{}`{}` is controlled along {why}: the middle of a long print says nothing about a position along it",
-        mode.named(),
+        mode.prefix(),
         feature.name
     );
     let help = match positions[..] {

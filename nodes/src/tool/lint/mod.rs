@@ -12,7 +12,7 @@
 //! | which exits of a mode wait for what? | `exits` |
 //! | how does a feature answer a motion, by geometry? | `geometry` |
 //! | what does a node do that guides the arm? | `guides` |
-//! | can the contacts of the bench be read? | `unread` |
+//! | can the contacts of the bench be read? | `contacts` |
 //! | does a mode roll without a force? | `rolling` |
 //! | does a mode wait for a contact without a motion? | `approach` |
 //! | is a setpoint or a threshold out of reach? | `reach` |
@@ -30,6 +30,7 @@
 
 mod approach;
 mod arm;
+mod contacts;
 mod deadbands;
 mod exit_bounds;
 mod exits;
@@ -45,7 +46,6 @@ mod reach;
 mod recovery;
 mod rolling;
 mod stability;
-mod unread;
 mod unused_columns;
 mod wrong_columns;
 
@@ -55,13 +55,13 @@ use tactflow_runtime::graph::Outline;
 use tactflow_runtime::source::{Code, Diagnostics};
 
 use super::control::contacts::contacts;
-use super::control::settings::{Index, commands};
+use super::control::nodes::{Index, commands};
 use arm::{Arm, carried};
 use mode_law::ModeLaw;
 
 /// The checks of an arm, in the order of their warnings.
 const CHECKS: [fn(&Arm<'_>) -> Diagnostics; 10] = [
-    unread::misnamed,
+    contacts::misnamed,
     touches,
     reach::check,
     lines::check,
@@ -83,7 +83,7 @@ pub(crate) fn lint(outline: &Outline, facts: &[(String, toml::Value)]) -> Diagno
     let mut found = Diagnostics::new();
     for command in commands(outline) {
         let contacts = contacts(facts, command.arm).unwrap_or_else(|why| {
-            found.push(unread::check(outline, command.arm, why));
+            found.push(contacts::check(outline, command.arm, why));
             Vec::new()
         });
         let Some(arm) = Arm::of(&index, &carried, command, contacts) else { continue };

@@ -7,7 +7,7 @@ use tactflow_runtime::graph::{NO_SPAN, OutlinedBlock, OutlinedMode};
 
 use super::guides::{is_composed, parks};
 use crate::tool::control::law::{Feature, Guidance, Law};
-use crate::tool::control::settings::{Nodes, source};
+use crate::tool::control::nodes::{Nodes, source};
 
 /// Types of the nodes that measure a contact, and whose geometry is known.
 const MEASURING: [&str; 6] = ["moments", "principal_axes", "hough", "curvature", "shear", "contact_area"];
@@ -107,7 +107,7 @@ impl<'a> ModeLaw<'a> {
     }
 
     /// Returns the start of a message about this mode.
-    pub(super) fn named(&self) -> String {
+    pub(super) fn prefix(&self) -> String {
         self.mode.map(|mode| format!("in mode `{}`, ", mode.name)).unwrap_or_default()
     }
 

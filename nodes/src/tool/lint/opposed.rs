@@ -36,7 +36,7 @@ fn retreat(mode: &ModeLaw<'_>) -> Option<Diagnostic> {
     let feature = mode.moving().find(presses)?;
     let message = format!(
         "{}`{node}` moves the sensor away from the object, but `{}` presses it back: the contact does not end",
-        mode.named(),
+        mode.prefix(),
         feature.name
     );
     Some(report(mode, feature, message, &deselect(2)))
@@ -65,7 +65,7 @@ fn held(mode: &ModeLaw<'_>) -> Option<Diagnostic> {
     let message = format!(
         "{}`{}` and `{}` both move `{}`: one holds the sensor at a place, the other one moves it to its setpoint, and it \
          rests between them",
-        mode.named(),
+        mode.prefix(),
         guide.node(),
         feature.name,
         COMPONENTS[i]
@@ -89,7 +89,7 @@ fn push(arm: &Arm<'_>, mode: &ModeLaw<'_>) -> Option<Diagnostic> {
     let message = format!(
         "{}`{}` moves the sensor into the object with {speed} m/s: mode `{}` before it presses, and no exit of this one waits \
          for what the pad feels",
-        mode.named(),
+        mode.prefix(),
         constant.node,
         before.own_name()
     );
@@ -126,7 +126,7 @@ fn pressed(arm: &Arm<'_>, mode: &ModeLaw<'_>) -> Option<Diagnostic> {
     let message = format!(
         "{}`{}` moves the sensor into the object with {speed} m/s beside the control of `{}`, which then rests {:.3} above its \
          setpoint",
-        mode.named(),
+        mode.prefix(),
         constant.node,
         feature.name,
         shift(feature)
@@ -146,7 +146,7 @@ fn waits_for_force(arm: &Arm<'_>, mode: &ModeLaw<'_>) -> bool {
 }
 
 /// Distance from its setpoint at which a constant motion may hold a contact [m].
-const BESIDE: f64 = 0.001;
+const MAX_DISTANCE: f64 = 0.001;
 
 /// Returns the warning about a constant motion along a component in which a feature holds the place of an object that does
 /// not move: the contact rests beside the setpoint, where the controller moves back as fast.
@@ -169,14 +169,14 @@ fn dragged(arm: &Arm<'_>, mode: &ModeLaw<'_>) -> Option<Diagnostic> {
                     && feature.column[i] != 0.0
                     && feature.is_open_in_contact(&mode.nodes)
                     && mode.quantity(feature) == Some(["x", "y"][i])
-                    && shift(feature) > BESIDE
+                    && shift(feature) > MAX_DISTANCE
             };
             let feature = mode.moving().find(is_shifted)?;
             Some((constant, feature, shift(feature)))
         })?;
     let message = format!(
         "{}`{}` moves the sensor along the object while `{}` holds its place: it rests {:.1} mm beside its setpoint",
-        mode.named(),
+        mode.prefix(),
         constant.node,
         feature.name,
         shift * 1e3
@@ -201,7 +201,7 @@ fn contended(mode: &ModeLaw<'_>) -> Option<Diagnostic> {
     let [one, other] = differing? else { return None };
     let message = format!(
         "{}the integrals of `{}` and `{}` both move `vz`, each toward its own setpoint: they wind up against each other",
-        mode.named(),
+        mode.prefix(),
         one.name,
         other.name
     );

@@ -7,7 +7,7 @@ use super::arm::Arm;
 use super::mode_law::ModeLaw;
 use crate::tool::control::filters::way;
 use crate::tool::control::law::Feature;
-use crate::tool::control::settings::source;
+use crate::tool::control::nodes::source;
 
 pub(super) fn check(arm: &Arm<'_>) -> Diagnostics {
     let mut found = Diagnostics::new();

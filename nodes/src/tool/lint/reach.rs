@@ -9,7 +9,7 @@ use super::exit_bounds::exit_bounds;
 use super::mode_law::ModeLaw;
 use crate::tool::control::exits::Exit;
 use crate::tool::control::law::Feature;
-use crate::tool::control::settings::source;
+use crate::tool::control::nodes::source;
 
 pub(super) fn check(arm: &Arm<'_>) -> Diagnostics {
     let mut found = Diagnostics::new();

@@ -9,13 +9,13 @@ use super::mode_law::ModeLaw;
 use crate::tool::control::exits::Exit;
 
 /// Share of a speed along the object that counts as one toward it [1].
-const BESIDE: f64 = 0.5;
+const SWEEP_SHARE: f64 = 0.5;
 
 impl ModeLaw<'_> {
     /// Returns the speed with which the mode searches [m/s]: toward the object, or half of that along it.
     fn search_speed(&self) -> f64 {
         let along = |i: usize| self.law.constants.iter().map(|constant| constant.twist[i]).sum::<f64>();
-        self.approach().max(along(0).hypot(along(1)) * BESIDE)
+        self.approach().max(along(0).hypot(along(1)) * SWEEP_SHARE)
     }
 }
 
@@ -69,7 +69,7 @@ fn fastest<'a>(
 
 fn report(exit: Exit<'_>, (fast, again, is_beside): (&str, f64, bool), (slow, first): (&str, f64)) -> Diagnostic {
     let (way, again, most, axis) = match is_beside {
-        true => ("sweeps along the object", again / BESIDE, first / BESIDE, "x and y"),
+        true => ("sweeps along the object", again / SWEEP_SHARE, first / SWEEP_SHARE, "x and y"),
         false => ("moves toward the object", again, first, "+z"),
     };
     let than = if is_beside { "more than twice as fast as" } else { "faster than" };

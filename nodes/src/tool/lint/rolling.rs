@@ -24,7 +24,7 @@ pub(super) fn check(arm: &Arm<'_>, mode: &ModeLaw<'_>) -> Option<Diagnostic> {
     let message = format!(
         "{}`{name}` rolls the sensor with `{}`, but no feature of the force moves `vz`: the pad loses the contact, or presses \
          harder and harder",
-        mode.named(),
+        mode.prefix(),
         COMPONENTS[i]
     );
     let help = "control the pressure along `vz` in this mode, or select no rolling: 0 for `wx` and `wy`";

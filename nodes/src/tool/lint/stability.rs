@@ -27,7 +27,7 @@ const MAX_LAG: f64 = 30.0;
 /// Phase margin from which on no filter is too slow [deg].
 const GOOD_PHASE: f64 = 50.0;
 /// Delay of filters from which on they are the cause of a low margin: that of a loop with the usual 3.5 1/s [s].
-const SLOW: f64 = 0.25;
+const LONG_DELAY: f64 = 0.25;
 /// Gain of one period at which `pid` itself warns [1].
 const DIVERGES: f64 = 2.0;
 
@@ -133,7 +133,7 @@ fn judge(mode: &ModeLaw<'_>, feature: &Feature, contacts: &[Contact]) -> Option<
         all.iter().filter(|found| is(found)).max_by(|one, other| peak(one).total_cmp(&peak(other)))
     };
     let low = worst(&|found| !KEPT.holds(&found.judged.margins));
-    let slow = worst(&|found| found.judged.is_slow()).filter(|_| low.is_none() || feature.delay() > SLOW);
+    let slow = worst(&|found| found.judged.is_slow()).filter(|_| low.is_none() || feature.delay() > LONG_DELAY);
     match (slow, low) {
         (Some(slow), low) => slow_filter(mode, feature, contacts, slow)
             .or_else(|| low.map(|low| low_margin(mode, feature, (contacts, &loops), low))),

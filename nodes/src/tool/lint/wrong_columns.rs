@@ -121,7 +121,7 @@ impl Judged<'_> {
         let name = &feature.name;
         let message = format!(
             "{}the projector leaves only {} of the column of `{name}`, which does not change `{name}` in a known direction",
-            mode.named(),
+            mode.prefix(),
             moved(&feature.column)
         );
         let help = format!(

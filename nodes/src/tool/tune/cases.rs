@@ -7,7 +7,7 @@ use tactflow_runtime::graph::{Outline, Request, compile};
 
 use super::{TuneArgs, signal};
 use crate::tool::control::contacts::{Contact, contacts};
-use crate::tool::control::settings::commands;
+use crate::tool::control::nodes::commands;
 
 /// A bench, and the contacts that it states.
 #[derive(Debug, Clone, PartialEq)]

@@ -50,13 +50,15 @@ pub(super) enum Answered {
 }
 
 impl Experiment<'_> {
-    /// Runs with a signal that moves the sensor to and fro along a component, by a way [m] or [rad].
+    /// Runs with a signal that moves the sensor to and fro along a component, by an amplitude [m] or [rad].
     ///
     /// # Errors
     /// If the graph with the signal does not load.
-    pub(super) fn run(&self, component: usize, way: f64) -> Result<Answered, String> {
-        let request =
-            Request { set: [&self.request.set[..], &self.settings(component, way)].concat(), ..self.request.clone() };
+    pub(super) fn run(&self, component: usize, amplitude: f64) -> Result<Answered, String> {
+        let request = Request {
+            set: [&self.request.set[..], &self.settings(component, amplitude)].concat(),
+            ..self.request.clone()
+        };
         let compiled = compile(self.catalogue, &request).map_err(|report| self.refused(&report))?;
         let mut engine = Engine::new(compiled);
         let pid = self.feature.pid.as_deref().unwrap_or_default();
@@ -110,7 +112,7 @@ impl Experiment<'_> {
     }
 
     /// Returns the settings of a run: the signal, its way into the motion, the share of the gains, and the end.
-    fn settings(&self, component: usize, way: f64) -> Vec<String> {
+    fn settings(&self, component: usize, amplitude: f64) -> Vec<String> {
         let unit = if component < 3 { "m/s" } else { "rad/s" };
         let fastest = FASTEST[component];
         let mut set = lift::settings(self.outline, self.mode, self.adder, measured(self.period) + self.period);
@@ -123,7 +125,7 @@ impl Experiment<'_> {
                 format!("nodes.{signal}.in.gate=modes.{}", self.mode.name),
                 format!("nodes.{signal}.form=sine"),
                 format!("nodes.{signal}.unit={unit}"),
-                format!("nodes.{signal}.amplitude={:?}", sine.speed(way, fastest, self.period)),
+                format!("nodes.{signal}.amplitude={:?}", sine.speed(amplitude, fastest, self.period)),
                 format!("nodes.{signal}.frequency={hz:?}"),
                 format!("nodes.{signal}.start={:?}", sine.begin as f64 * self.period),
                 format!("nodes.{signal}.duration={lasts:?}"),

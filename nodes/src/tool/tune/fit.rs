@@ -4,7 +4,7 @@ use nalgebra::Complex;
 use serde::Serialize;
 
 use super::spectrum::Line;
-use crate::tool::control::response::arm;
+use crate::tool::control::response::resonance;
 use crate::tool::control::shape::turn;
 
 /// How a feature answers one component of the motion.
@@ -29,8 +29,8 @@ impl Fit {
     /// Returns what was measured as a multiple of the fit, at the frequencies that noise hardly changes. `known` is that
     /// of the fit.
     pub(super) fn missed(&self, lines: &[Line], known: impl Fn(f64) -> Complex<f64>) -> Vec<(f64, Complex<f64>)> {
-        let resonance = self.resonance.map(|(hz, damping)| (2.0 * std::f64::consts::PI * hz, damping));
-        let fitted = |omega: f64| known(omega) * arm(omega, resonance) * turn(omega * self.latency) * self.gain;
+        let own = self.resonance.map(|(hz, damping)| (2.0 * std::f64::consts::PI * hz, damping));
+        let fitted = |omega: f64| known(omega) * resonance(omega, own) * turn(omega * self.latency) * self.gain;
         let clear = lines.iter().filter(|line| line.error <= CLEAR);
         clear.map(|line| (line.omega, line.open / fitted(line.omega))).collect()
     }
@@ -63,7 +63,7 @@ pub(super) fn fit(lines: &[Line], known: impl Fn(f64) -> Complex<f64>) -> Result
         return Err(good.len());
     }
     let most = |of: fn(&Line) -> f64| good.iter().map(|line| of(line)).fold(0.0, f64::max);
-    let (loudest, furthest) = (most(|line| line.open.norm()), most(|line| line.way));
+    let (loudest, furthest) = (most(|line| line.open.norm()), most(|line| line.amplitude));
     let certain = |line: &&Line| {
         let weight = 1.0 / (line.error * line.error + MODEL_ERROR * MODEL_ERROR);
         (line.omega, line.open / known(line.omega), weight)
@@ -71,7 +71,7 @@ pub(super) fn fit(lines: &[Line], known: impl Fn(f64) -> Complex<f64>) -> Result
     let equal: Vec<Point> = good.iter().map(certain).collect();
     let heard = |line: &Line| {
         let norm = line.open.norm();
-        (norm / (norm + FAINT * loudest)).powi(2) * line.way / furthest
+        (norm / (norm + FAINT * loudest)).powi(2) * line.amplitude / furthest
     };
     let points: Vec<Point> =
         equal.iter().zip(&good).map(|(point, line)| (point.0, point.1, point.2 * heard(line))).collect();
@@ -173,7 +173,7 @@ fn search(points: &[Point], spans: [Span; 3]) -> Best {
     for own in spans[0].values() {
         for damping in spans[1].values() {
             for latency in spans[2].values() {
-                let model = |omega: f64| arm(omega, Some((own, damping))) * turn(omega * latency);
+                let model = |omega: f64| resonance(omega, Some((own, damping))) * turn(omega * latency);
                 let (gain, error) = gain(points, model);
                 if error < best.error {
                     best = Best { at: [own, damping, latency], gain, error, ..best };
@@ -205,13 +205,13 @@ mod tests {
 
     use super::*;
 
-    fn lines(gain: f64, resonance: Option<(f64, f64)>, latency: f64, noise: f64) -> Vec<Line> {
+    fn lines(gain: f64, own: Option<(f64, f64)>, latency: f64, noise: f64) -> Vec<Line> {
         let mut random = Random::new(7, 0);
         let omegas = (1..=32).map(|i| 2.0 * std::f64::consts::PI * 0.25 * f64::from(i));
         let mut line = |omega: f64| {
-            let ideal = arm(omega, resonance) * turn(omega * latency) * gain;
+            let ideal = resonance(omega, own) * turn(omega * latency) * gain;
             let noisy = Complex::new(random.normal(), random.normal()) * noise * ideal.norm();
-            Line { omega, open: ideal + noisy, way: 1.0, error: noise }
+            Line { omega, open: ideal + noisy, amplitude: 1.0, error: noise }
         };
         omegas.map(&mut line).collect()
     }

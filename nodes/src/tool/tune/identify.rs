@@ -5,10 +5,10 @@ use serde::Serialize;
 use tactflow_runtime::cli::Shell;
 
 use super::Stop;
+use super::amplitudes::{Response, agreed};
 use super::experiment::{Experiment, HALF};
 use super::fit::{ENOUGH, Fit, fit};
 use super::spectrum::Line;
-use super::ways::{Response, agreed};
 use crate::motion::COMPONENTS;
 use crate::tool::control::contacts::Answer;
 use crate::tool::control::digits::rounded_to_three_digits;

@@ -1,5 +1,6 @@
 //! `tactflow tune`: measures how the features answer, and proposes gains with margins.
 
+mod amplitudes;
 mod bode;
 mod cases;
 mod course;
@@ -19,7 +20,6 @@ mod step;
 mod target;
 mod trial;
 mod tuned;
-mod ways;
 
 use std::path::{Path, PathBuf};
 
@@ -32,7 +32,7 @@ use super::arguments::{may_draw, write};
 use super::control::chain::chain;
 use super::control::choose::Wanted;
 use super::control::contacts::Contact;
-use super::control::settings::{Index, Nodes, commands};
+use super::control::nodes::{Index, Nodes, commands};
 use cases::{Case, cases};
 use propose::Measurement;
 use ranges::Range;

@@ -50,9 +50,9 @@ impl Sine {
         self.begin + (self.settling + self.measured) * self.ticks
     }
 
-    /// Returns its amplitude as a speed, for a way [m] or [rad].
-    pub(super) fn speed(&self, way: f64, fastest: f64, period: f64) -> f64 {
-        (2.0 * PI * way / (self.ticks as f64 * period)).min(fastest)
+    /// Returns its amplitude as a speed, for an amplitude of the motion [m] or [rad].
+    pub(super) fn speed(&self, amplitude: f64, fastest: f64, period: f64) -> f64 {
+        (2.0 * PI * amplitude / (self.ticks as f64 * period)).min(fastest)
     }
 }
 

@@ -15,7 +15,7 @@ pub(super) struct Line {
     /// The response around the loop: L, with half of the gains of the graph.
     pub(super) open: Complex<f64>,
     /// Amplitude of the whole motion [m] or [rad].
-    pub(super) way: f64,
+    pub(super) amplitude: f64,
     /// Standard deviation of the response by noise, as the periods differ, relative to the response [1].
     pub(super) error: f64,
 }
@@ -35,12 +35,12 @@ impl Line {
     pub(super) fn mean(runs: &[Vec<Self>]) -> Vec<Self> {
         let of = |i: usize| {
             let all = || runs.iter().filter_map(move |lines| lines.get(i));
-            let most = all().map(|line| line.way).fold(0.0, f64::max);
-            let far: Vec<&Self> = all().filter(|line| line.way >= AS_LARGE * most).collect();
+            let most = all().map(|line| line.amplitude).fold(0.0, f64::max);
+            let far: Vec<&Self> = all().filter(|line| line.amplitude >= AS_LARGE * most).collect();
             let number = far.len() as f64;
             let open = far.iter().map(|line| line.open).sum::<Complex<f64>>() / number;
             let variance = far.iter().map(|line| (line.open.norm() * line.error).powi(2)).sum::<f64>();
-            Self { omega: far[0].omega, open, way: most, error: variance.sqrt() / number / open.norm() }
+            Self { omega: far[0].omega, open, amplitude: most, error: variance.sqrt() / number / open.norm() }
         };
         (0..runs.first().map_or(0, Vec::len)).map(of).collect()
     }
@@ -59,7 +59,7 @@ pub(super) fn line(rows: &[[f64; 2]], sine: &Sine, period: f64) -> Line {
     Line {
         omega,
         open: -own / all,
-        way: 2.0 * all.norm() / (sine.ticks as f64 * omega),
+        amplitude: 2.0 * all.norm() / (sine.ticks as f64 * omega),
         error: (spread / (periods * (periods - 1.0))).sqrt() / own.norm(),
     }
 }

@@ -6,7 +6,7 @@ use tactflow_runtime::graph::{Outline, OutlinedMode};
 use super::lift;
 use super::propose::TunedFeature;
 use crate::tool::control::law::setpoint;
-use crate::tool::control::settings::{Index, Nodes, mode_flag, toml};
+use crate::tool::control::nodes::{Index, Nodes, mode_flag, toml};
 
 /// How long a task holds its setpoints before the first step [s].
 const BEFORE_S: f64 = 12.0;

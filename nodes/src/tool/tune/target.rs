@@ -5,8 +5,8 @@ use tactflow_runtime::graph::OutlinedMode;
 use super::TuneArgs;
 use crate::tool::control::collect::law;
 use crate::tool::control::law::Feature;
+use crate::tool::control::nodes::{Index, Nodes};
 use crate::tool::control::schedule::Schedule;
-use crate::tool::control::settings::{Index, Nodes};
 
 /// Returns the mode that is tuned, and its features.
 pub(super) fn controlled<'o>(

@@ -1,4 +1,4 @@
-//! Test signals of growing ways, until two of them say the same.
+//! Test signals of growing amplitudes, until two of them say the same.
 
 use tactflow_runtime::cli::Shell;
 
@@ -7,16 +7,16 @@ use super::experiment::{Answered, Experiment};
 use super::fit::ENOUGH;
 use super::spectrum::Line;
 
-/// Ways of a linear [m] and of an angular test signal [rad], one after the other.
-const WAYS: [[f64; 4]; 2] = [[0.3e-3, 1.2e-3, 2.4e-3, 4.8e-3], [0.01, 0.02, 0.04, 0.08]];
+/// Amplitudes of a linear [m] and of an angular test signal [rad], one after the other.
+const AMPLITUDES: [[f64; 4]; 2] = [[0.3e-3, 1.2e-3, 2.4e-3, 4.8e-3], [0.01, 0.02, 0.04, 0.08]];
 /// Difference of two responses that agree, as the median over the frequencies [1].
 const AGREES: f64 = 0.2;
 /// A motion that is so many times as large as another one is larger [1].
 const FURTHER: f64 = 1.3;
-/// Change of the response from one way to the next with which the larger one counts [1].
+/// Change of the response from one amplitude to the next with which the larger one counts [1].
 const MAX_CHANGE: f64 = 0.5;
 
-/// What the motions of all ways say.
+/// What the motions of all amplitudes say.
 pub(super) struct Response {
     pub(super) lines: Vec<Line>,
     /// The last response as a multiple of the one before, if no two of them agree [1].
@@ -42,12 +42,12 @@ pub(super) fn agreed(
     let mut runs: Vec<Vec<Line>> = Vec::new();
     let mut stopped = None;
     let unit = if component < 3 { "m" } else { "rad" };
-    for way in WAYS[component / 3] {
-        shell.say_beside(&format!("`{}`: a test signal of {way} {unit}", experiment.feature.name));
-        match experiment.run(component, way)? {
+    for amplitude in AMPLITUDES[component / 3] {
+        shell.say_beside(&format!("`{}`: a test signal of {amplitude} {unit}", experiment.feature.name));
+        match experiment.run(component, amplitude)? {
             Answered::Lines(lines) => runs.push(lines),
             Answered::Nothing(reason) => {
-                stopped = Some(format!("with a test signal of {way} {unit}, {reason}"));
+                stopped = Some(format!("with a test signal of {amplitude} {unit}, {reason}"));
                 break;
             }
             Answered::Interrupted => return Err(Stop::Interrupted),
@@ -100,7 +100,8 @@ fn loudness(one: &[Line], other: &[Line]) -> f64 {
 
 /// Returns the median of a number of two responses, over the frequencies where the second motion was larger.
 fn further(one: &[Line], other: &[Line], of: impl Fn(&Line, &Line) -> f64) -> Option<f64> {
-    let larger = one.iter().zip(other).filter(|(a, b)| b.way >= FURTHER * a.way && a.counts() && b.counts());
+    let larger =
+        one.iter().zip(other).filter(|(a, b)| b.amplitude >= FURTHER * a.amplitude && a.counts() && b.counts());
     let mut found: Vec<f64> = larger.map(|(a, b)| of(a, b)).collect();
     found.sort_by(f64::total_cmp);
     found.get(found.len() / 2).copied()

@@ -6,7 +6,7 @@ use tactflow_runtime::graph::OutlinedBlock;
 use crate::tool::control::chain::Limiter;
 use crate::tool::control::contacts::Contact;
 use crate::tool::control::law::Law;
-use crate::tool::control::settings::Nodes;
+use crate::tool::control::nodes::Nodes;
 
 /// A motion that meets an object: the constant twist of a mode, or the search for a lost contact.
 #[derive(Debug, Serialize)]
