@@ -25,7 +25,7 @@ struct Passage {
     delays: Vec<Filter>,
 }
 
-/// Part of a motion along another component that is none [1].
+/// Largest share of a motion, beside its largest component, that counts as 0 [1].
 const REST: f64 = 1e-4;
 
 impl Default for Passage {

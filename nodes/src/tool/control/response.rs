@@ -22,7 +22,7 @@ pub(crate) struct Loop {
     ki: f64,
     kd: f64,
     shapes: Vec<Shape>,
-    /// Change of the feature for each unit of the control, over time.
+    /// Speed at which the feature changes, for each unit of the control.
     pub(crate) gain: f64,
     resonance: Option<(f64, f64)>,
     latency: f64,

@@ -9,7 +9,7 @@ use super::mode_law::ModeLaw;
 pub(super) fn exit_bounds(arm: &Arm<'_>, mode: &ModeLaw<'_>) -> Diagnostics {
     let never = mode.conditions().filter_map(|exit| {
         let (when, above) = (exit.when()?, exit.entry("above")?);
-        // Only something that pushes the pad gives more, and then the sensor is right to leave.
+        // An object that pushes the pad can exceed the limit, and then the sensor is right to leave.
         if exit.to().is_some_and(|to| arm.leaves(to)) {
             return None;
         }

@@ -45,7 +45,7 @@ pub(super) fn holds(nodes: &Nodes<'_>, guide: &Guidance) -> Option<[bool; 6]> {
             Some(std::array::from_fn(|i| if i < 3 { linear } else { angular }))
         }
         "follow_path" => {
-            // Otherwise the force holds the distance to the surface on which the path lies.
+            // A path in the plane of the pad leaves z to the control of the force.
             let is_in_plane = nodes.value(node, "in_plane").and_then(|value| value.value.read()).unwrap_or(false);
             Some([linear, linear, linear && !is_in_plane, false, false, false])
         }

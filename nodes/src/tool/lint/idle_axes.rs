@@ -22,7 +22,7 @@ fn idle_axes<'a>(arm: &Arm<'a>, mode: &ModeLaw<'a>, projector: &'a OutlinedBlock
     let behind = source(projector, "twist").map(|twist| law(&mode.nodes, twist));
     let Some((setting, behind)) = select.zip(behind) else { return Diagnostics::new() };
     let Some(select) = setting.value.read::<[f64; 6]>() else { return Diagnostics::new() };
-    // All components: the projector selects nothing.
+    // A projector that passes all components makes no choice.
     let selects_all = select.iter().all(|entry| *entry != 0.0);
     if selects_all || !behind.guidance.is_empty() || behind.features.is_empty() {
         return Diagnostics::new();

@@ -43,7 +43,8 @@ fn along_line(arm: &Arm<'_>, mode: &ModeLaw<'_>) -> Option<Diagnostic> {
     let stated = shortest_line(arm, mode, feature);
     let why = match constants.next().map(|constant| &*constant.node).or_else(guide) {
         Some(follower) if stated.as_ref().is_none_or(Line::is_longer) => format!("the line that `{follower}` follows"),
-        // It crawls along the line, which matters where nothing but the end of the contact ends it.
+        // Without a follower, the control of the position itself moves slowly along the line. This matters in a mode
+        // that only the end of the contact ends.
         _ if !mode.lasts() => return None,
         _ => stated.filter(Line::is_longer)?.to_string(),
     };

@@ -49,7 +49,7 @@ fn away<'a>(mode: &'a ModeLaw<'_>) -> Option<(&'a str, f64)> {
     let speed: f64 = constants().map(|(_, speed)| speed).sum();
     let constant = constants().find(|(_, own)| all_open && speed < 0.0 && *own < 0.0).map(|(node, _)| (node, -speed));
     let parks = |guide: &&Guidance| guide.is_open && parks(&mode.nodes, guide);
-    // It is slower at the end of its way.
+    // A node that parks slows down at its place, so that any force presses faster there.
     let park = || mode.law.guidance.iter().find(parks).map(|guide| (guide.node(), 0.0));
     constant.or_else(park)
 }

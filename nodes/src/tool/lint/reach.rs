@@ -1,5 +1,5 @@
-//! What a mode asks for and never gets: a setpoint beyond a limit, below a threshold or beside a window, and a threshold of a
-//! node beyond a limit.
+//! What a mode asks for and never gets: a setpoint beyond a limit, below a threshold or beside a window, and a threshold
+//! of a node beyond a limit.
 
 use tactflow_runtime::source::{Code, Diagnostic, Diagnostics};
 

@@ -21,8 +21,8 @@ use crate::tool::control::shape::Shape;
 const KEPT: Wanted = Wanted { peak: 1.8, gain_db: 8.0, phase_deg: 0.0 };
 /// Margins that the rough sweep may show too large, and that still keep [`KEPT`].
 const AMPLE: Wanted = Wanted { peak: 1.4, gain_db: 12.0, phase_deg: 55.0 };
-/// Lag of the filters where the gain is 1, of which a loop with less than [`GOOD_PHASE`] is warned: a third of the
-/// quarter turn that an integrator leaves [deg].
+/// Largest lag of the filters where the gain is 1, in a loop with less than [`GOOD_PHASE`] [deg]. An integrator leaves
+/// 90 degrees of phase, and this is a third of them.
 const MAX_LAG: f64 = 30.0;
 /// Phase margin from which on no filter is too slow [deg].
 const GOOD_PHASE: f64 = 50.0;

@@ -25,7 +25,7 @@ pub(super) fn check(arm: &Arm<'_>) -> Diagnostics {
     let dead = features.filter(|feature| !controls(feature) && !is_along_line(arm, feature));
     let found = dead.filter_map(|feature| {
         let column = first.column(feature)?;
-        // Of the components of the column, those that change the feature.
+        // What to select: the components that change the feature, if its column has one of them.
         let row = first.quantity(feature).and_then(Geometry::of).filter(|row| row.changes(&column));
         let answers = row.map(|row| row.components(" or "));
         let (message, help) = match column == [0.0; 6] {

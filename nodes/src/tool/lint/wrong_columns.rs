@@ -39,8 +39,8 @@ fn wrong(arm: &Arm<'_>, mode: &ModeLaw<'_>, feature: &Feature) -> Option<Diagnos
     }
 }
 
-/// Returns the column of a feature as it is written, before all projectors. Where a mount turns it, returns what reaches
-/// the arm.
+/// Returns the column of a feature as it is written, before all projectors. Where a mount turns it, returns what
+/// reaches the arm.
 fn judged_column(mode: &ModeLaw<'_>, feature: &Feature) -> Option<[f64; 6]> {
     if feature.mount.is_some() { Some(feature.column) } else { mode.column(feature) }
 }
@@ -57,9 +57,9 @@ struct Judged<'a> {
 }
 
 impl Judged<'_> {
-    /// Returns the warning about a column that slides or rolls a contact more along the other axis than along its own, or
-    /// that slides it more than it presses. With two such columns the contact circles around its setpoint, or runs away
-    /// from it.
+    /// Returns the warning about a column that slides or rolls a contact more along the other axis than along its own,
+    /// or that slides it more than it presses. With two such columns the contact circles around its setpoint, or runs
+    /// away from it.
     fn aside(&self) -> Option<Diagnostic> {
         let Self { feature, quantity, column, .. } = self;
         let answers = || self.arm.contacts.iter().filter_map(|contact| contact.features.get(*quantity));
@@ -76,8 +76,8 @@ impl Judged<'_> {
             (right[*own], right[*other]) = (sign * to_three_digits(size), 0.0);
         }
         let message = format!(
-            "the column of `{}` moves the sensor more with `{}`, which does not change `{quantity}`, than with `{}`, which \
-             does",
+            "the column of `{}` moves the sensor more with `{}`, which does not change `{quantity}`, than with `{}`, \
+             which does",
             feature.name, COMPONENTS[other], COMPONENTS[own]
         );
         Some(replaced(self.mode, feature, message, right))
@@ -93,7 +93,7 @@ impl Judged<'_> {
             feature.column[known.component] * known.sign < 0.0 && !is_said && !self.is_outweighed(known)
         };
         let first = self.geometry.known.iter().find(is_reversed)?;
-        // Of what is not selected, too.
+        // The entries that no projector selects get their signs too.
         let right = self.geometry.signed(*column);
         let message = format!(
             "the column of `{}` increases its error: `{}` is {}, but {}",
@@ -159,7 +159,8 @@ impl Judged<'_> {
         })
     }
 
-    /// Returns the warning about two columns that are exchanged. The second one of the pair would say the same.
+    /// Returns the warning about two columns that are exchanged; `None` for the second one of the pair, whose warning
+    /// would be the same.
     fn exchange(&self, other: &Other<'_>) -> Option<Diagnostic> {
         let Self { mode, feature, .. } = self;
         let (name, other_name) = (&feature.name, &other.feature.name);

@@ -32,8 +32,8 @@ pub(super) struct Refusal {
 
 /// Moves further and further along a component, as far as the task stays in its mode, and returns the response to the
 /// largest motions that agree. Friction hides a small motion, and gives two of them the same wrong response: no larger
-/// motion may have a larger one. If the last two only differ a little, the larger response counts, which has the smaller margins: a
-/// contact may stiffen when it is pressed further, and press less when it is nearly left.
+/// motion may have a larger one. If the last two only differ a little, the larger response counts, which has the smaller
+/// margins: a contact may stiffen when it is pressed further, and press less when it is nearly left.
 pub(super) fn agreed(
     experiment: &Experiment<'_>,
     component: usize,

@@ -61,8 +61,8 @@ pub(super) struct Measurement<'a> {
 }
 
 impl Measurement<'_> {
-    /// Measures a feature, again with other gains if the first ones lead it astray, and proposes gains. Returns the contacts
-    /// with its answers too.
+    /// Measures a feature, and again with other gains where the first ones say too little, and proposes gains. Returns
+    /// the contacts with its answers too.
     pub(super) fn proposal(
         &self,
         feature: &Feature,
