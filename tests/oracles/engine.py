@@ -31,7 +31,7 @@ MODEL = Path(__file__).resolve().parents[2] / "graphs/robots/lwr4p.urdf"
 # Inertia of the drives that remains under torque control [kg m²], and the friction of the joints [N m].
 DRIVES = [0.96, 0.92, 0.6, 0.62, 0.24, 0.12, 0.12]
 JOINT_FRICTION = 0.1
-STIFFNESS, DAMPING_RATIO = 200.0, 0.2
+DAMPING_RATIO = 0.2
 # The foam of a tactel [N/m, N/m³], where it stiffens [m], its creep, and the spread of a force over the tactels [m].
 FOAM, CUBIC, SOFT, CREEP, CREEP_S, SPREAD = 300.0, 8e7, 0.0025, 0.05, 1.5, 0.003
 # Coefficient of friction, and the stiffness of a bristle over that of the foam.
@@ -179,7 +179,8 @@ class World:
         self.site, self.body = self.model.site("pad").id, self.model.body("lwr_7_link").id
         inertia = np.zeros((len(NAMES), len(NAMES)))
         mujoco.mj_fullM(self.model, self.data, inertia)
-        self.damping = 2.0 * DAMPING_RATIO * np.sqrt(STIFFNESS * np.diag(inertia))
+        self.stiffness = args.joints
+        self.damping = 2.0 * DAMPING_RATIO * np.sqrt(self.stiffness * np.diag(inertia))
         self.q_eq = np.array(START)
         self.axes0, self.at0 = (value.copy() for value in self.pad())
         self.gains = np.exp(self.random.normal(0.0, GAINS, (CELLS, CELLS)))
@@ -221,7 +222,7 @@ class World:
             self.scene.advance(self.time, dt)
             self.q_eq = self.q_eq + np.array(velocity) * dt
             force, torque, at = self.touch(dt)
-            applied = STIFFNESS * (self.q_eq - self.data.qpos) - self.damping * self.data.qvel
+            applied = self.stiffness * (self.q_eq - self.data.qpos) - self.damping * self.data.qvel
             mujoco.mj_applyFT(self.model, self.data, force, torque, at, self.body, applied)
             self.data.qfrc_applied[:] = applied
             mujoco.mj_step(self.model, self.data)
@@ -358,6 +359,7 @@ def main():
     parser.add_argument("--repeat", type=float, default=0.0, help="share of frames that repeat the one before")
     parser.add_argument("--garbage", type=float, default=[], action="append", help="time of a frame at its maximum [s]")
     parser.add_argument("--change", type=float, nargs=2, help="when what is changed begins and ends [s]")
+    parser.add_argument("--joints", type=float, default=200.0, help="stiffness of the arm's joints [N m/rad]")
     parser.add_argument("--stiffness", type=float, default=1e6, help="of the object behind a tactel [N/m]")
     parser.add_argument("--seconds", type=float, default=10.0)
     parser.add_argument("--seed", type=int, default=1)

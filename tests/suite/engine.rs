@@ -38,7 +38,23 @@ struct Event {
     holds: &'static [(&'static str, f64)],
 }
 
-const EVENTS: [Event; 11] = [
+const EVENTS: [Event; 14] = [
+    // Joints that are stiffer than the robot file states: four times, and so stiff that the arm hardly gives way.
+    Event {
+        task: "force",
+        scene: "--scene ball --radius 0.031 --stiffness 1400 --joints 800",
+        holds: &[("/lost", 0.0), ("/response/pressure", 0.85), ("/most", 6.3), ("/true_rms", 0.045)],
+    },
+    Event {
+        task: "force",
+        scene: "--scene pen --radius 0.005 --size 0.05 0.05 --joints 3000",
+        holds: &[("/lost", 0.0), ("/response/pressure", 1.0), ("/most", 13.0), ("/true_rms", 0.03)],
+    },
+    Event {
+        task: "rolling",
+        scene: "--scene ball --radius 0.031 --stiffness 1400 --joints 3000",
+        holds: &[("/lost", 0.0), ("/response/pressure", 0.8), ("/most", 5.0), ("/true_rms", 0.05)],
+    },
     // Five times as stiff at once.
     Event {
         task: "force",

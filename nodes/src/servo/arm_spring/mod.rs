@@ -26,9 +26,9 @@ use learned::Spring;
 ///
 /// **The compliance 1/K is learned.** It begins with that of the joints, J k⁻¹ Jᵀ along the normal in the posture of the
 /// arm. Then a factor on it is fitted to lead and force, by least squares over the last 2 s of contact. The factor is
-/// between 1/3 and 3. What is stated counts as much as a second with 1 N at first, and less with each second of contact. So
-/// a wrong stiffness matters in the first press alone: with 3 N for a second, with 0.3 N for some seconds. The factor stays
-/// when the contact ends.
+/// between 1/20 and 3. What is stated counts as much as 0.1 s with 1 N at first, and less with each second of contact. So a
+/// wrong stiffness matters while the first press grows, and with 0.3 N for some seconds. The factor stays when the contact
+/// ends.
 ///
 /// Both outputs are absent while an input is absent. So they are absent while nothing touches the pad. They are also absent
 /// while the force misses the lead by more than 10 mm, as in a frame of garbage, while all commands are held, for an arm
