@@ -108,7 +108,7 @@ fn help(task: &'static str, changes: &[&str]) -> String {
 }
 
 #[test]
-fn behind_a_mount_the_right_column_is_that_behind_it() {
+fn the_help_states_the_column_that_stands_behind_the_mount() {
     let contact = "set facts.arm.contacts=[{ object = \"ball\", x = { vx = 1.0 } }]";
     let columns = ["columns.x = [1, 0, 0, 0, 0, 0]", "columns.y = [0, 1, 0, 0, 0, 0]"];
     let help = help("hybrid", &[&HALF_TURN[..], &columns, &[contact]].concat());

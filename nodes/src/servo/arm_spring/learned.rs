@@ -8,15 +8,15 @@ pub(super) const SETTLE_S: f64 = 0.3;
 pub(super) const SMOOTH_S: f64 = 0.02;
 /// Time of contact in which the weight of a sample decays to 37 %, and that of what is stated [s].
 const MEMORY_S: f64 = 2.0;
-/// Weight of the stated compliance at first, as the square of a force times the time for which it acts [N² s]. A first press
-/// with 3 N shows after 10 ms what an arm is.
+/// Weight of the stated compliance at first, as the square of a force times the time for which it acts [N² s]. After
+/// 11 ms with 3 N, what is measured counts as much.
 const STATED: f64 = 0.1;
 /// Its weight in the end: without a force, there is nothing to learn [N² s].
 const STATED_AT_LEAST: f64 = 0.01;
-/// How many times as much as stated the compliance may be: a force that bends the arm too far would be taken for a swing [1].
-const LARGEST: f64 = 3.0;
-/// How many times as much as stated it may be at least, for an arm that is hardly compliant [1].
-const SMALLEST: f64 = 0.05;
+/// Largest compliance, as a multiple of the stated one. With too large a one, each force looks like a swing [1].
+const MAX_FACTOR: f64 = 3.0;
+/// Smallest compliance, as a multiple of the stated one: that of an arm that hardly gives way [1].
+const MIN_FACTOR: f64 = 0.05;
 
 /// A force that misses the lead by more than this is no measurement [m].
 const MOST_SWING_M: f64 = 0.01;
@@ -102,7 +102,7 @@ impl Spring {
     fn factor(&self, compliance: f64) -> f64 {
         let weight = self.stated.unwrap_or(STATED) * compliance * compliance;
         let whole = weight + self.squares;
-        if whole > 0.0 { ((weight + self.products) / whole).clamp(SMALLEST, LARGEST) } else { 1.0 }
+        if whole > 0.0 { ((weight + self.products) / whole).clamp(MIN_FACTOR, MAX_FACTOR) } else { 1.0 }
     }
 }
 

@@ -76,12 +76,12 @@ impl Passage {
         passage
     }
 
-    /// Returns whether no gate or switch stands in the way that may be closed.
+    /// Returns whether every gate and switch on the way is open, whatever the pad feels.
     fn is_open(&self, nodes: &Nodes<'_>) -> bool {
         self.sides.is_empty() && self.gates.iter().all(|gate| nodes.is_open(gate))
     }
 
-    /// Returns whether no gate or switch stands in the way that may be closed during a contact.
+    /// Returns whether every gate and switch on the way is open during a contact.
     fn is_open_in_contact(&self, nodes: &Nodes<'_>) -> bool {
         self.sides.is_empty() && self.gates.iter().all(|gate| nodes.is_open_in_contact(gate))
     }

@@ -93,9 +93,14 @@ impl Answer {
 }
 
 impl Contact {
-    /// Returns a contact of which nothing is measured; that with no object stands for geometry alone.
+    /// Returns a contact of which nothing is measured.
     pub(crate) const fn unmeasured(object: String) -> Self {
         Self { object, latency_ms: 0.0, features: BTreeMap::new() }
+    }
+
+    /// Returns the contact with no object, where geometry alone says how features answer.
+    pub(crate) const fn by_geometry() -> Self {
+        Self::unmeasured(String::new())
     }
 
     /// Returns the name of the object; `None` where geometry alone says how features answer.

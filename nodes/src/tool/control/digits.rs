@@ -1,14 +1,15 @@
 //! Numbers with few digits, for messages and for values that a file gets.
-//!
-//! The functions differ in how they round a tie, and in what they make of a negative number.
 
-/// Returns a number with three digits, as its decimal text has them: a tie goes to the even digit.
+/// Returns a number with three digits.
 pub(crate) fn to_three_digits(number: f64) -> f64 {
     format!("{number:.2e}").parse().unwrap_or(number)
 }
 
-/// Returns a number that is not 0 with two digits, rounded by `round`.
+/// Returns a number with two digits, rounded by `round`; 0 and what is not finite stay.
 pub(crate) fn to_two_digits(number: f64, round: impl Fn(f64) -> f64) -> f64 {
+    if number == 0.0 || !number.is_finite() {
+        return number;
+    }
     let digits = 1.0 - libm::floor(libm::log10(number.abs()));
     let scale = libm::pow(10.0, digits);
     let exact = round(number * scale) / scale;
@@ -24,25 +25,6 @@ pub(crate) fn down_to_two_digits(number: f64) -> f64 {
     to_two_digits(number, libm::floor)
 }
 
-/// Returns a number with three digits: a tie goes away from 0.
-pub(crate) fn rounded_to_three_digits(value: f64) -> f64 {
-    scaled(value, 3, f64::round)
-}
-
-/// Returns a number of any sign with two digits that is not larger.
-pub(crate) fn floored_to_two_digits(value: f64) -> f64 {
-    scaled(value, 2, f64::floor)
-}
-
-/// Returns a number with so many digits, rounded by `round`; 0 and what is not finite stay.
-fn scaled(value: f64, digits: i32, round: impl Fn(f64) -> f64) -> f64 {
-    if value == 0.0 || !value.is_finite() {
-        return value;
-    }
-    let scale = 10.0_f64.powi(digits - 1 - value.abs().log10().floor() as i32);
-    round(value * scale) / scale
-}
-
 /// Returns a value with its unit and so many digits behind the point, or `none`.
 pub(crate) fn or_none(value: Option<f64>, unit: &str, digits: usize) -> String {
     value.map_or_else(|| "none".to_owned(), |value| format!("{value:.digits$} {unit}"))
@@ -54,8 +36,8 @@ mod tests {
 
     #[test]
     fn a_number_keeps_three_digits_and_a_gain_never_grows() {
-        assert_eq!([12.3456, -0.012345, 0.0, 1234.5].map(rounded_to_three_digits), [12.3, -0.0123, 0.0, 1230.0]);
-        assert_eq!([12.99, 0.0199, 3.5].map(floored_to_two_digits), [12.0, 0.019, 3.5]);
+        assert_eq!([12.3456, -0.012345, 0.0, 1234.5].map(to_three_digits), [12.3, -0.0123, 0.0, 1230.0]);
+        assert_eq!([12.99, 0.0199, 3.5, 0.0].map(down_to_two_digits), [12.0, 0.019, 3.5, 0.0]);
     }
 
     #[test]

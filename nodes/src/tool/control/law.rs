@@ -66,10 +66,10 @@ pub(crate) struct Feature {
 pub(crate) struct Constant {
     pub(crate) node: String,
     pub(crate) twist: [f64; 6],
-    /// Whether no gate or switch stands in its way that may be closed.
+    /// Whether every gate and switch on its way is open, whatever the pad feels.
     #[serde(skip)]
     pub(crate) is_open: bool,
-    /// Whether no gate or switch stands in its way that may be closed during a contact.
+    /// Whether every gate and switch on its way is open during a contact.
     #[serde(skip)]
     pub(crate) is_open_in_contact: bool,
 }
@@ -82,7 +82,7 @@ pub(crate) struct Guidance {
     pub(crate) kind: String,
     /// Components that the projectors behind it pass.
     pub(crate) passes: [bool; 6],
-    /// Whether no gate or switch stands in its way that may be closed.
+    /// Whether every gate and switch on its way is open, whatever the pad feels.
     #[serde(skip)]
     pub(crate) is_open: bool,
 }
@@ -183,8 +183,7 @@ impl Feature {
             && !(own_gate(self, other) && own_gate(other, self))
     }
 
-    /// Returns whether it moves the arm whenever it is present: no gate or switch stands in its way that may be closed
-    /// during a contact.
+    /// Returns whether it moves the arm whenever it is present: every gate and switch on its way is open during a contact.
     pub(crate) fn is_open_in_contact(&self, nodes: &Nodes<'_>) -> bool {
         self.sides.is_empty() && self.gates.iter().all(|gate| nodes.is_open_in_contact(gate))
     }

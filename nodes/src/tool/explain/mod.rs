@@ -114,7 +114,8 @@ fn explain(compiled: &Compiled, port: Option<&str>) -> Result<Explained, String>
     Ok(Explained { period_s: outline.period_s, motions: motions.into_iter().collect::<Result<_, _>>()? })
 }
 
-/// Returns what a port carries to an arm, with the contacts that the bench declares for it: those of "" are none.
+/// Returns what a port carries to an arm, with the contacts that the bench declares for it. For a port that is no command,
+/// the arm is "", which has no contacts.
 fn motion(compiled: &Compiled, index: &Index<'_>, of: String, command: Command<'_>) -> Result<Motion, String> {
     let Command { arm, port } = command;
     let (limits, twist) = chain(&Nodes::new(index, None), port)?;

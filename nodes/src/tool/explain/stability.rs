@@ -24,7 +24,7 @@ pub(super) struct Stability {
 
 /// Returns the margins of all features that a law controls, with the contacts that the bench declares for the arm.
 pub(super) fn stability(declared: &[Contact], law: &Law, period: f64) -> Vec<Stability> {
-    let alone = [Contact::unmeasured(String::new())];
+    let alone = [Contact::by_geometry()];
     let declared = if declared.is_empty() { &alone[..] } else { declared };
     let controlled: Vec<&Feature> = law.features.iter().filter(|feature| feature.moves()).collect();
     let loops = declared.iter().flat_map(|contact| {

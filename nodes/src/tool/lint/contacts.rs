@@ -10,7 +10,7 @@ use crate::tool::control::contacts::{Contact, contacts};
 use crate::tool::control::law::Feature;
 
 /// Returns the warning about the contacts of an arm that cannot be read, and why.
-pub(super) fn check(outline: &Outline, arm: &str, why: String) -> Diagnostic {
+pub(super) fn unreadable(outline: &Outline, arm: &str, why: String) -> Diagnostic {
     let name = format!("{arm}.contacts");
     let value = outline.facts.iter().find(|(fact, _)| *fact == name).map(|(_, value)| value);
     let place = value.map_or(NO_SPAN, |value| place(&name, arm, value, &why));

@@ -34,8 +34,8 @@ pub(super) fn rests(nodes: &Nodes<'_>, guide: &Guidance) -> bool {
     node.and_then(|node| nodes.number(node, "speed_m_per_s")) == Some(0.0)
 }
 
-/// Returns the components in which a node holds the sensor at a place in a mode. One with a gate may hold it at other
-/// times.
+/// Returns the components in which a node holds the sensor at a place; `None` if it holds none, or if its gate may be closed
+/// during a contact.
 pub(super) fn holds(nodes: &Nodes<'_>, guide: &Guidance) -> Option<[bool; 6]> {
     let node = nodes.node(guide.node())?;
     let moves = |key: &str| nodes.number(node, key).is_some_and(|speed| speed > 0.0);

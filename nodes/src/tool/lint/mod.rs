@@ -27,6 +27,8 @@
 //! | is a column used in no mode? | `unused_columns` |
 //! | does a gain do harm whatever is touched? | `gains` |
 //! | is a loop near instability over a contact? | `stability` |
+//!
+//! `reach` asks `exit_bounds` and `deadbands`, and `gains` asks `deadbands`.
 
 mod approach;
 mod arm;
@@ -82,11 +84,11 @@ pub(crate) fn lint(outline: &Outline, facts: &[(String, toml::Value)]) -> Diagno
     let carried = carried(outline);
     let mut found = Diagnostics::new();
     for command in commands(outline) {
-        let contacts = contacts(facts, command.arm).unwrap_or_else(|why| {
-            found.push(contacts::check(outline, command.arm, why));
+        let declared = contacts(facts, command.arm).unwrap_or_else(|why| {
+            found.push(contacts::unreadable(outline, command.arm, why));
             Vec::new()
         });
-        let Some(arm) = Arm::of(&index, &carried, command, contacts) else { continue };
+        let Some(arm) = Arm::of(&index, &carried, command, declared) else { continue };
         found.extend(without_consequences(CHECKS.iter().flat_map(|check| check(&arm)).collect()));
     }
     // Several modes, and several parts of the same file, read the same number.

@@ -146,7 +146,7 @@ fn waits_for_force(arm: &Arm<'_>, mode: &ModeLaw<'_>) -> bool {
 }
 
 /// Distance from its setpoint at which a constant motion may hold a contact [m].
-const MAX_DISTANCE: f64 = 0.001;
+const MAX_SHIFT_M: f64 = 0.001;
 
 /// Returns the warning about a constant motion along a component in which a feature holds the place of an object that does
 /// not move: the contact rests beside the setpoint, where the controller moves back as fast.
@@ -169,7 +169,7 @@ fn dragged(arm: &Arm<'_>, mode: &ModeLaw<'_>) -> Option<Diagnostic> {
                     && feature.column[i] != 0.0
                     && feature.is_open_in_contact(&mode.nodes)
                     && mode.quantity(feature) == Some(["x", "y"][i])
-                    && shift(feature) > MAX_DISTANCE
+                    && shift(feature) > MAX_SHIFT_M
             };
             let feature = mode.moving().find(is_shifted)?;
             Some((constant, feature, shift(feature)))

@@ -42,8 +42,8 @@ pub(super) fn check(arm: &Arm<'_>) -> Diagnostics {
     found
 }
 
-/// Returns a mode and those that follow it while the task has no contact. A mode that a lost contact ends is not one of
-/// them, and neither are those behind an exit that waits for a contact, and those that are known.
+/// Returns a mode and those that follow it while the task has no contact. The search ends at a mode that a lost contact ends,
+/// at an exit that waits for a contact, and at modes that are known.
 fn search<'a>(arm: &'a Arm<'_>, from: &'a str, known: &BTreeSet<&str>) -> BTreeSet<&'a str> {
     let (mut open, mut found) = (vec![from], BTreeSet::new());
     while let Some(name) = open.pop() {

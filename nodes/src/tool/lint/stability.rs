@@ -32,13 +32,13 @@ const LONG_DELAY: f64 = 0.25;
 const DIVERGES: f64 = 2.0;
 
 /// A loop, and what its filters do to it.
-struct Judged {
+struct JudgedLoop {
     margins: Margins,
     /// Lag of the filters where the gain is 1, and 0 if it never is [deg].
     lag: f64,
 }
 
-impl Judged {
+impl JudgedLoop {
     /// Returns whether the filters take the phase margin of the loop.
     fn is_slow(&self) -> bool {
         let Margins { is_stable, phase_deg, .. } = self.margins;
@@ -53,25 +53,25 @@ impl Judged {
 }
 
 /// Judges a loop with the filters of a feature.
-fn judged(feature: &Feature, around: &Loop) -> Judged {
+fn judge_loop(feature: &Feature, around: &Loop) -> JudgedLoop {
     let margins = margins(around);
     let omega = |hz: f64| 2.0 * std::f64::consts::PI * hz;
     let lag = |hz: f64| {
         let responses = feature.filters.iter().map(|filter| filter.shape.response(omega(hz), around.period));
         responses.map(|response| -response.arg().to_degrees()).sum()
     };
-    Judged { margins, lag: margins.crossover_hz.map_or(0.0, lag) }
+    JudgedLoop { margins, lag: margins.crossover_hz.map_or(0.0, lag) }
 }
 
 /// A loop over a contact that was not ample.
 struct Found<'a> {
     object: Option<&'a str>,
-    judged: Judged,
+    judged: JudgedLoop,
 }
 
 pub(super) fn check(arm: &Arm<'_>) -> Diagnostics {
     let mut found = Diagnostics::new();
-    let geometry = [Contact::unmeasured(String::new())];
+    let geometry = [Contact::by_geometry()];
     let contacts = if arm.contacts.is_empty() { &geometry[..] } else { &arm.contacts[..] };
     // Most modes have the same loops.
     let mut seen = BTreeSet::new();
@@ -123,7 +123,7 @@ fn judge(mode: &ModeLaw<'_>, feature: &Feature, contacts: &[Contact]) -> Option<
     let all: Vec<Found<'_>> = loops
         .iter()
         .filter(|(_, around)| !AMPLE.holds(&rough_margins(around)))
-        .map(|(contact, around)| Found { object: contact.name(), judged: judged(feature, around) })
+        .map(|(contact, around)| Found { object: contact.name(), judged: judge_loop(feature, around) })
         .collect();
     let peak = |found: &&Found<'_>| match found.judged.margins {
         Margins { is_stable: true, peak_sensitivity, .. } => peak_sensitivity,
@@ -207,13 +207,13 @@ fn low_margin(
 
 /// Returns the place of a derivative gain that alone takes the margins of all loops, and what stands there without it.
 fn undamped(mode: &ModeLaw<'_>, feature: &Feature, loops: &[Loop]) -> Option<(Range<usize>, String)> {
-    let is_good = |around: &Loop| judged(feature, &around.without_derivative()).is_good();
+    let is_good = |around: &Loop| judge_loop(feature, &around.without_derivative()).is_good();
     (feature.kd > 0.0 && loops.iter().all(is_good)).then(|| (mode.place_of_gain(feature, "kd"), "0.0".to_owned()))
 }
 
 /// Returns the largest factor on the gains, up to a first one, with which the filters are quick enough for each loop.
 fn quick(feature: &Feature, loops: &[Loop], first: f64) -> Option<f64> {
-    let is_quick = |factor: f64| loops.iter().all(|around| judged(feature, &around.times(factor)).is_good());
+    let is_quick = |factor: f64| loops.iter().all(|around| judge_loop(feature, &around.times(factor)).is_good());
     std::iter::successors(Some(first), |factor| Some(factor * 0.95)).take(40).find(|factor| is_quick(*factor))
 }
 
@@ -264,7 +264,7 @@ fn faster(mode: &ModeLaw<'_>, feature: &Feature, contacts: &[Contact], i: usize)
     let period = mode.nodes.period();
     let is_good = |feature: &Feature| {
         let mut loops = contacts.iter().filter_map(|contact| Loop::over(feature, contact, period));
-        loops.all(|around| judged(feature, &around).is_good())
+        loops.all(|around| judge_loop(feature, &around).is_good())
     };
     let shares = std::iter::successors(Some(0.8), |share| Some(share * 0.8)).take(20);
     shares.into_iter().find(|share| {

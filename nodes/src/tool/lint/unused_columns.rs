@@ -26,8 +26,8 @@ pub(super) fn check(arm: &Arm<'_>) -> Diagnostics {
     let found = dead.filter_map(|feature| {
         let column = first.column(feature)?;
         // What to select: the components that change the feature, if its column has one of them.
-        let row = first.quantity(feature).and_then(Geometry::of).filter(|row| row.changes(&column));
-        let answers = row.map(|row| row.components(" or "));
+        let geometry = first.quantity(feature).and_then(Geometry::of).filter(|geometry| geometry.changes(&column));
+        let components = geometry.map(|geometry| geometry.components(" or "));
         let (message, help) = match column == [0.0; 6] {
             true => (
                 format!("the column of `{}` is zero, so its gains do nothing", feature.name),
@@ -44,7 +44,7 @@ pub(super) fn check(arm: &Arm<'_>) -> Diagnostics {
                 format!("no mode selects a component of the column of `{}`, so its gains do nothing", feature.name),
                 format!(
                     "select {} in a projector, {}",
-                    answers.unwrap_or_else(|| moved(&column)),
+                    components.unwrap_or_else(|| moved(&column)),
                     without(arm, feature)
                 ),
             ),

@@ -29,7 +29,7 @@ fn wrong(arm: &Arm<'_>, mode: &ModeLaw<'_>, feature: &Feature) -> Option<Diagnos
         return reversed(arm, mode, feature).or_else(|| offset(arm, mode, feature));
     };
     let column = judged_column(mode, feature)?;
-    let judged = Judged { arm, mode, feature, quantity, geometry, column };
+    let judged = JudgedColumn { arm, mode, feature, quantity, geometry, column };
     let (changes, is_selected) = (geometry.changes(&column), geometry.changes(&feature.column));
     match (changes && is_selected, geometry.is_needed) {
         (true, _) => judged.aside().or_else(|| judged.against()).or_else(|| reversed(arm, mode, feature)),
@@ -46,7 +46,7 @@ fn judged_column(mode: &ModeLaw<'_>, feature: &Feature) -> Option<[f64; 6]> {
 }
 
 /// A column, and what geometry says of its feature.
-struct Judged<'a> {
+struct JudgedColumn<'a> {
     arm: &'a Arm<'a>,
     mode: &'a ModeLaw<'a>,
     feature: &'a Feature,
@@ -56,7 +56,7 @@ struct Judged<'a> {
     column: [f64; 6],
 }
 
-impl Judged<'_> {
+impl JudgedColumn<'_> {
     /// Returns the warning about a column that slides or rolls a contact more along the other axis than along its own,
     /// or that slides it more than it presses. With two such columns the contact circles around its setpoint, or runs
     /// away from it.
@@ -241,7 +241,7 @@ fn offset(arm: &Arm<'_>, mode: &ModeLaw<'_>, feature: &Feature) -> Option<Diagno
 
 /// Returns the start of a message about a column that a mount turns.
 fn behind(feature: &Feature) -> String {
-    feature.mount.as_ref().map(|turner| format!("behind `{turner}`, ")).unwrap_or_default()
+    feature.mount.as_ref().map(|mount| format!("behind `{mount}`, ")).unwrap_or_default()
 }
 
 /// Returns the warning about a column, with the right one as a fix.
@@ -251,8 +251,8 @@ fn replaced(mode: &ModeLaw<'_>, feature: &Feature, message: String, right: [f64;
     let (place, right) = (mode.place_of_column(feature), array(&right));
     let diagnostic = Diagnostic::new(Code::WrongColumn, place.clone(), behind(feature) + &message);
     match &feature.mount {
-        Some(turner) => diagnostic.help(format!(
-            "behind `{turner}`, the column must be {right}: turn the column that is written, or check the pose"
+        Some(mount) => diagnostic.help(format!(
+            "behind `{mount}`, the column must be {right}: turn the column that is written, or check the pose"
         )),
         None => {
             diagnostic.help(format!("write `columns.{} = {right}`", feature.name)).edit(Edit::Replace(place, right))

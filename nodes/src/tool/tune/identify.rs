@@ -11,7 +11,7 @@ use super::fit::{ENOUGH, Fit, fit};
 use super::spectrum::Line;
 use crate::motion::COMPONENTS;
 use crate::tool::control::contacts::Answer;
-use crate::tool::control::digits::rounded_to_three_digits;
+use crate::tool::control::digits::to_three_digits;
 use crate::tool::control::law::Feature;
 use crate::tool::control::response::Loop;
 
@@ -137,11 +137,11 @@ pub(super) fn answer(quantity: &str, fits: &[(&'static str, Fit)]) -> Answer {
         };
         let index = COMPONENTS.iter().position(|name| name == component);
         let slides = index.map_or(0.0, |i| geometry[i]);
-        *entry = Some(if slides.abs() > fit.gain.abs() { slides } else { rounded_to_three_digits(fit.gain) });
+        *entry = Some(if slides.abs() > fit.gain.abs() { slides } else { to_three_digits(fit.gain) });
     }
     let Some((_, main)) = fits.first() else { return answer };
-    answer.resonance_hz = main.resonance.map(|(hz, _)| rounded_to_three_digits(hz));
-    answer.damping_ratio = main.resonance.map(|(_, damping)| rounded_to_three_digits(damping));
+    answer.resonance_hz = main.resonance.map(|(hz, _)| to_three_digits(hz));
+    answer.damping_ratio = main.resonance.map(|(_, damping)| to_three_digits(damping));
     answer.latency_ms = Some((main.latency * 1e4).round() / 10.0);
     answer
 }

@@ -46,7 +46,7 @@ use tuned::Tuned;
     name = "tune",
     after_help = "It runs the task and moves the robot. For each feature that the mode controls, it halves the gains, moves the sensor to and
 fro with sines of 0.2 to 8 Hz, one after the other, and moves further and further. This takes 75 s for each of four
-ways. All limits of the graph hold. From the answers it fits a gain, a resonance and a latency, and
+amplitudes. All limits of the graph hold. From the answers it fits a gain, a resonance and a latency, and
 proposes the largest gains that keep the margins over all contacts. Then it runs the task with them, and compares.
 
 Examples:

@@ -12,7 +12,7 @@ use super::save;
 use super::step::Step;
 use super::trial::Held;
 use super::tuned::Tuned;
-use crate::tool::control::digits::{or_none, rounded_to_three_digits};
+use crate::tool::control::digits::{or_none, to_three_digits};
 
 /// Columns of the table of answers.
 const ANSWERS: [&str; 7] = ["contact", "motion", "per m or rad", "resonance", "damping", "latency", "frequencies"];
@@ -39,7 +39,7 @@ fn answers(found: &[Identified]) -> String {
             [
                 one.object.clone(),
                 (*component).to_owned(),
-                rounded_to_three_digits(fit.gain).to_string(),
+                to_three_digits(fit.gain).to_string(),
                 or_none(hz, "Hz", 1),
                 damping.map_or_else(String::new, |damping| format!("{damping:.2}")),
                 format!("{:.0} ms", fit.latency * 1e3),
@@ -93,9 +93,8 @@ fn gains(feature: &TunedFeature) -> String {
 fn settled(tuned: &Tuned) -> String {
     let mut text = String::new();
     for one in &tuned.settled {
-        let error = |held: &Held| {
-            held.error.map_or_else(|| "unknown".into(), |error| rounded_to_three_digits(error).to_string())
-        };
+        let error =
+            |held: &Held| held.error.map_or_else(|| "unknown".into(), |error| to_three_digits(error).to_string());
         let (old, new) = (error(&one.old), error(&one.new));
         let _ = write!(
             text,
@@ -103,7 +102,7 @@ fn settled(tuned: &Tuned) -> String {
             one.object, one.feature
         );
         if let Some((old, new)) = one.old.step.zip(one.new.step) {
-            let (size, old, new) = (rounded_to_three_digits(new.size), followed(&old), followed(&new));
+            let (size, old, new) = (to_three_digits(new.size), followed(&old), followed(&new));
             let _ = write!(text, ". A step of {size} {old} with the old gains, and {new} with the new ones");
         }
         match &one.failure {

@@ -13,7 +13,7 @@ use super::identify::{Identified, answer, identify, known, quantity};
 use crate::motion::COMPONENTS;
 use crate::tool::control::choose::{Wanted, factor};
 use crate::tool::control::contacts::Contact;
-use crate::tool::control::digits::{floored_to_two_digits, rounded_to_three_digits};
+use crate::tool::control::digits::{down_to_two_digits, to_three_digits};
 use crate::tool::control::law::Feature;
 use crate::tool::control::margins::{Margins, margins};
 use crate::tool::control::response::Loop;
@@ -134,8 +134,9 @@ fn propose(
     let each: Vec<Loop> = loops.iter().filter_map(measured).chain(loops.iter().map(|(_, one)| one.clone())).collect();
     let factor = factor(&each, wanted).filter(|_| is_measured && loops.len() == contacts.len());
     // Rounded down, so that the margins hold.
-    let factor = factor.map(|factor| floored_to_two_digits(feature.kp * factor) / feature.kp);
-    let new = factor.map(|factor| old.map(|gain| rounded_to_three_digits(gain * factor)));
+    let size = feature.kp.abs();
+    let factor = factor.map(|factor| down_to_two_digits(size * factor) / size);
+    let new = factor.map(|factor| old.map(|gain| to_three_digits(gain * factor)));
     let loops: Vec<(usize, Loop)> =
         loops.into_iter().map(|(i, around)| (i, around.times(factor.unwrap_or(1.0)))).collect();
     let margins = new.map(|_| loops.iter().map(|(_, around)| margins(around)).collect()).unwrap_or_default();

@@ -12,7 +12,7 @@ use crate::tool::control::shape::turn;
 pub(super) struct Line {
     /// Circular frequency [rad/s].
     pub(super) omega: f64,
-    /// The response L around the loop, converted to half of the gains of the graph.
+    /// The response L around the loop. `Experiment::run` converts it to half of the gains of the graph.
     pub(super) open: Complex<f64>,
     /// Amplitude of the whole motion [m] or [rad].
     pub(super) amplitude: f64,
