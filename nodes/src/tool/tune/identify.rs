@@ -43,13 +43,8 @@ const MAX_RESIDUAL: f64 = 0.3;
 const MAX_RESIDUAL_SLIDING: f64 = 0.2;
 
 /// Measures how a feature answers each component that moves it.
-pub(super) fn identify(
-    experiment: &Experiment<'_>,
-    object: &str,
-    period: f64,
-    shell: &Shell,
-) -> Result<Identified, Stop> {
-    let feature = experiment.feature;
+pub(super) fn identify(experiment: &Experiment<'_>, object: &str, shell: &Shell) -> Result<Identified, Stop> {
+    let Experiment { feature, period, .. } = *experiment;
     let mut found = Identified {
         object: object.to_owned(),
         fits: Vec::new(),

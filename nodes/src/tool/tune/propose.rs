@@ -98,7 +98,7 @@ impl Measurement<'_> {
         let found = self.cases.iter().zip(&mut contacts).map(|(case, contact)| {
             let request = &case.request;
             let experiment = Experiment { catalogue, request, outline, mode, adder, feature, period, share };
-            let found = identify(&experiment, &case.object, period, self.shell)?;
+            let found = identify(&experiment, &case.object, self.shell)?;
             if found.refused.is_none() {
                 let quantity = quantity(feature);
                 contact.features.insert(quantity.clone(), answer(&quantity, &found.fits));
