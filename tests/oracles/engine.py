@@ -34,6 +34,8 @@ JOINT_FRICTION = 0.1
 DAMPING_RATIO = 0.2
 # The foam of a tactel [N/m, N/m³], where it stiffens [m], its creep, and the spread of a force over the tactels [m].
 FOAM, CUBIC, SOFT, CREEP, CREEP_S, SPREAD = 300.0, 8e7, 0.0025, 0.05, 1.5, 0.003
+# Of an edge or a rim at 45 degrees.
+TILTED = math.sqrt(0.5)
 # Coefficient of friction, and the stiffness of a bristle over that of the foam.
 FRICTION, BRISTLES = 0.35, 0.6
 # Noise that all tactels of a frame share (of the reading), noise of each tactel [units], spread of the gains.
@@ -46,6 +48,7 @@ class Scene:
     def __init__(self, args):
         self.radius, self.bend, self.kind = args.radius, args.bend, args.scene
         self.half = np.array([*args.size, 0.04]) / 2
+        self.axes = np.array(args.axes)
         # Where it is and where it goes [m], its angle [rad], and how both change now.
         self.place, self.angle = np.array([*args.offset, args.gap]), args.angle
         self.goal, self.speed, self.velocity = self.place.copy(), args.speed, np.zeros(3)
@@ -71,6 +74,13 @@ class Scene:
         x, y = x - self.place[0], y - self.place[1]
         sin, cos = math.sin(self.angle), math.cos(self.angle)
         along, across = x * cos + y * sin, y * cos - x * sin
+        if self.kind == "rim":
+            # The nearest point of the rim, which the pad sees as an ellipse.
+            turned = np.linspace(-1.0, 1.0, 2001)
+            way, beside = self.radius * np.sin(turned), self.radius * TILTED * (1.0 - np.cos(turned))
+            at = np.argmin((way - along) ** 2 + (beside - across) ** 2)
+            angle = self.angle + math.atan2(math.sin(turned[at]) * TILTED, math.cos(turned[at]))
+            return way[at], across - beside[at], angle
         if not self.bend:
             return along, across, self.angle
         # An arc: its centre is beside it. Along it is the length of the arc.
@@ -79,19 +89,58 @@ class Scene:
         return self.bend * turned, self.bend - np.hypot(along, beside), self.angle + turned
 
     def depth(self, points):
-        along, across, _ = self.line_at(points[0], points[1])
         x, y, z = (points[i] - self.place[i] for i in range(3))
+        if self.kind in ("ellipsoid", "rim"):
+            sin, cos = math.sin(self.angle), math.cos(self.angle)
+            x, y = x * cos + y * sin, y * cos - x * sin
+            return self.in_ellipsoid(x, y, z) if self.kind == "ellipsoid" else self.in_disc(x, y, z)
+        along, across, _ = self.line_at(points[0], points[1])
         if self.kind == "ball":
             return self.radius - np.sqrt(x * x + y * y + (z - self.radius) ** 2)
         if self.kind == "pen":
             beyond = np.maximum(0.0, np.abs(along) - self.half[0])
             return self.radius - np.sqrt(beyond**2 + across**2 + (z - self.radius) ** 2)
         if self.kind == "edge":
-            return (z - np.abs(across)) * math.sqrt(0.5)
+            return (z - np.abs(across)) * TILTED
         # A box with edges of 2 mm.
         place = np.abs([along, across, z - self.half[2]]) - (self.half[:, None] - 0.002)
         outside = np.sqrt((np.maximum(place, 0.0) ** 2).sum(axis=0))
         return 0.002 - outside - np.minimum(place.max(axis=0), 0.0)
+
+
+    def in_ellipsoid(self, x, y, z):
+        """By the first term of the distance, which is exact at the surface."""
+        at = np.stack([x, y, z - self.axes[2]], -1) / self.axes
+        size, slope = np.linalg.norm(at, axis=-1), np.linalg.norm(at / self.axes, axis=-1)
+        return size * (1.0 - size) / np.maximum(slope, 1e-9)
+
+    def in_disc(self, x, y, z):
+        """In a disc that is tilted by 45 degrees and 40 mm thick; its rim has a radius of 1 mm."""
+        out, up = TILTED * (y + z) - self.radius, TILTED * (z - y)
+        place = np.stack([np.hypot(x, out) - self.radius, np.abs(up - 0.02) - 0.02]) + 0.001
+        outside = np.sqrt((np.maximum(place, 0.0) ** 2).sum(axis=0))
+        return 0.001 - outside - np.minimum(place.max(axis=0), 0.0)
+
+
+class Cap:
+    """Which points of an ellipsoid the pad has pressed, of those that are inclined by up to 40 degrees."""
+
+    def __init__(self, scene):
+        self.scene = scene
+        angles = [(tilt, 2.0 * math.pi * i / count) for tilt in np.radians(np.linspace(0.0, 40.0, 30))
+                  for count in [max(1, round(60 * math.sin(tilt)))] for i in range(count)]
+        normals = np.array([[math.sin(t) * math.cos(a), math.sin(t) * math.sin(a), -math.cos(t)] for t, a in angles])
+        self.points = normals * scene.axes**2 / np.linalg.norm(normals * scene.axes, axis=1)[:, None]
+        self.points[:, 2] += scene.axes[2]
+        self.pressed = np.zeros(len(self.points), bool)
+
+    def see(self, axes, middle):
+        """With the pad at this place, in its axes at the start."""
+        sin, cos = math.sin(self.scene.angle), math.cos(self.scene.angle)
+        points = self.points @ np.array([[cos, sin, 0.0], [-sin, cos, 0.0], [0.0, 0.0, 1.0]]) + self.scene.place
+        x, y, z = ((points - middle) @ axes).T
+        half = CELLS * PITCH / 2
+        self.pressed |= (np.abs(x) < half) & (np.abs(y) < half) & (z < 0.0) & (z > -0.01)
 
 
 class Foam:
@@ -183,6 +232,7 @@ class World:
         self.damping = 2.0 * DAMPING_RATIO * np.sqrt(self.stiffness * np.diag(inertia))
         self.q_eq = np.array(START)
         self.axes0, self.at0 = (value.copy() for value in self.pad())
+        self.cap = Cap(self.scene) if args.scene == "ellipsoid" else None
         self.gains = np.exp(self.random.normal(0.0, GAINS, (CELLS, CELLS)))
 
     def pad(self):
@@ -229,6 +279,8 @@ class World:
             mujoco.mj_kinematics(self.model, self.data)
             mujoco.mj_comPos(self.model, self.data)
             mujoco.mj_comVel(self.model, self.data)
+        if self.cap:
+            self.cap.see(*self.placed())
 
     def image(self, units):
         noisy = units * self.gains * (1.0 + self.random.normal(0.0, COMMON)) + self.random.normal(0.0, OWN, units.shape)
@@ -286,16 +338,19 @@ def seen(rows, change):
 def figures(rows):
     """Times [s], forces [N], pressures [units] and places [tactels].
 
-    `lost` counts the frames without a contact, but not the first 25. `error` and `deviation` are of what the pad says
-    in the last 5 s, and `true_error` is of the truth. `line` has the mean and the deviation of the angle between the
-    object's line and y of the pad [degrees], and the deviation of its distance [mm].
+    `lost` counts the frames without a contact, but not the first 25, and `found_again` the contacts after them. `error`
+    and `deviation` are of what the pad says in the last 5 s, and `true_error` is of the truth. `line` has the mean and
+    the deviation of the angle between the object's line and y of the pad [degrees], and the deviation of its distance
+    [mm].
     """
     times, force, pressure, x, y, felt, felt_x, felt_y, angle, across = rows.T
     last = slice(-round(5.0 / DT), None)
     mean = np.convolve(felt, np.ones(10) / 10, "valid")
     truth = ((pressure, 1.0), (x, 0.0), (y, 0.0))
+    found = np.diff((force[25:] >= 0.02).astype(int)) == 1
     return {
         "touched": float(times[0]), "lost": int((force[25:] < 0.02).sum()), "most": float(force.max()),
+        "found_again": int(found.sum()),
         "response": {name: response(times, values, target, within) for name, (values, target), within in
                      zip(("pressure", "x", "y"), truth, (0.12, 0.3, 0.3))},
         "error": [number(np.mean(felt[last]) - 1.0), number(np.mean(felt_x[last])), number(np.mean(felt_y[last]))],
@@ -334,17 +389,21 @@ def serve(lines, args, world):
         world.step(answer["dq"])
     else:
         say({"type": "end"})
-    return {"frames": len(rows), "end": end, **seen(rows, args.change)}
+    said = {"frames": len(rows), "end": end, **seen(rows, args.change)}
+    # The part of the cap that the pad has not pressed [%].
+    return {**said, "missed": 100.0 * float(1.0 - world.cap.pressed.mean())} if world.cap else said
 
 
 def main():
     parser = argparse.ArgumentParser()
     parser.add_argument("--port", type=int, default=0)
-    parser.add_argument("--scene", default="ball", choices=["ball", "pen", "box", "edge"])
+    parser.add_argument("--scene", default="ball", choices=["ball", "pen", "box", "edge", "rim", "ellipsoid"])
     parser.add_argument("--offset", type=float, nargs=2, default=[0.0, 0.0], help="along the sensor's x and y [m]")
     parser.add_argument("--gap", type=float, default=0.006, help="from the pad to the object at the start [m]")
-    parser.add_argument("--radius", type=float, default=0.04, help="of ball or pen [m]")
+    parser.add_argument("--radius", type=float, default=0.04, help="of ball, pen or rim [m]")
     parser.add_argument("--size", type=float, nargs=2, default=[0.04, 0.03], help="of the box, along its axes [m]")
+    parser.add_argument("--axes", type=float, nargs=3, default=[0.07, 0.11, 0.05],
+                        help="half axes of the ellipsoid [m]")
     parser.add_argument("--angle", type=float, default=0.0, help="from the sensor's x [rad]")
     parser.add_argument("--bend", type=float, default=0.0, help="radius of the arc of a pen; 0 is straight [m]")
     parser.add_argument("--move", type=float, nargs=4, default=[], action="append", metavar=("T", "X", "Y", "Z"),

@@ -38,7 +38,7 @@ struct Event {
     holds: &'static [(&'static str, f64)],
 }
 
-const EVENTS: [Event; 14] = [
+const EVENTS: [Event; 18] = [
     // Joints that are stiffer than the robot file states: four times, and so stiff that the arm hardly gives way.
     Event {
         task: "force",
@@ -105,6 +105,28 @@ const EVENTS: [Event; 14] = [
         task: "edge",
         scene: "--scene pen --radius 0.003 --size 0.3 0.1 --turn 6 --turn-from 4 --change 4 6",
         holds: &[("/lost", 0.0), ("/after/line/0", 0.15), ("/after/line/1", 0.15)],
+    },
+    // An edge that bends with a radius of 60 mm, and the rim of a disc of 120 mm.
+    Event {
+        task: "edge",
+        scene: "--scene edge --bend 0.06",
+        holds: &[("/lost", 0.0), ("/line/0", 0.5), ("/line/1", 0.1)],
+    },
+    Event {
+        task: "edge",
+        scene: "--scene rim --radius 0.06",
+        holds: &[("/lost", 0.0), ("/line/0", 3.0), ("/line/1", 0.2)],
+    },
+    // Ellipsoids, of which the second is flat and takes joints to their limits.
+    Event {
+        task: "explore",
+        scene: "--scene ellipsoid --stiffness 400 --seconds 90",
+        holds: &[("/found_again", 1.0), ("/most", 12.0), ("/missed", 2.0)],
+    },
+    Event {
+        task: "explore",
+        scene: "--scene ellipsoid --axes 0.08 0.1 0.035 --stiffness 1000 --seconds 90",
+        holds: &[("/found_again", 3.0), ("/most", 13.0), ("/missed", 3.0)],
     },
     // A cable that bends with a radius of 44 mm. Gains of the tactels that differ by 5 % turn the line that is measured.
     Event {
@@ -222,7 +244,7 @@ fn the_tasks_bear_what_happens_to_objects_and_pad_on_a_physics_engine() {
         for (angle, place) in
             angles.into_iter().zip(["--offset 0.006 -0.004 --seed 5", "--offset -0.005 0.005 --seed 6"])
         {
-            let (seen, failure) = run(task, &format!("{scene} {place} --angle {angle} --seconds 11"));
+            let (seen, failure) = run(task, &format!("--seconds 11 {scene} {place} --angle {angle}"));
             let at = |path: &str| seen.pointer(path).map_or(f64::MAX, figure);
             let wrongs: Vec<_> = holds.iter().filter(|(path, most)| at(path).abs() > *most).collect();
             if !failure.is_empty() || !wrongs.is_empty() {

@@ -1,7 +1,7 @@
 //! Objects: a shape with a pose, a stiffness, a compliant mount and a script of motions.
 
 use parry3d_f64::math::{Pose3, Rot3, Vec3};
-use parry3d_f64::shape::{Ball, Cuboid};
+use parry3d_f64::shape::{Ball, Cuboid, Cylinder};
 use tactflow_runtime::node::Param;
 use tactflow_runtime::signal::Pose;
 
@@ -21,6 +21,8 @@ pub enum ShapeKind {
     Box,
     /// A cylinder with round ends along its y.
     Pen,
+    /// A cylinder with sharp rims along its y.
+    Disc,
     /// An ellipsoid.
     Ellipsoid,
     /// A round cable along a smooth curve.
@@ -38,10 +40,10 @@ pub struct ObjectParams {
     /// Roll, pitch and yaw in the sensor's axes at the start.
     #[param(unit = "rad", usual = -USUAL_RAD..=USUAL_RAD, default = [0.0; 3])]
     pub(crate) turn: [f64; 3],
-    /// Radius of a ball, a pen or a cable.
+    /// Radius of a ball, a pen, a disc or a cable.
     #[param(unit = "m", above = 0.0, usual = ..=USUAL_REACH_M)]
     pub(crate) radius: Option<f64>,
-    /// Length of a pen between the centres of its ends.
+    /// Length of a pen between the centres of its ends, or thickness of a disc.
     #[param(unit = "m", above = 0.0, usual = ..=USUAL_REACH_M)]
     pub(crate) length: Option<f64>,
     /// Edge lengths of a box, or full axes of an ellipsoid.
@@ -263,7 +265,7 @@ fn shape_of(params: &ObjectParams) -> Result<Geometry, String> {
         ShapeKind::Plane => &[],
         ShapeKind::Ball => &["radius"],
         ShapeKind::Box | ShapeKind::Ellipsoid => &["size"],
-        ShapeKind::Pen => &["radius", "length"],
+        ShapeKind::Pen | ShapeKind::Disc => &["radius", "length"],
         ShapeKind::Cable => &["radius", "points"],
     };
     let ObjectParams { radius, length, size, points, .. } = params;
@@ -293,6 +295,7 @@ fn shape_of(params: &ObjectParams) -> Result<Geometry, String> {
         ShapeKind::Box => Geometry::Box(Cuboid::new(Vec3::from(half_size))),
         ShapeKind::Ellipsoid => Geometry::ellipsoid(half_size),
         ShapeKind::Pen => Geometry::pen(radius, length.unwrap_or_default()),
+        ShapeKind::Disc => Geometry::Disc(Cylinder::new(length.unwrap_or_default() / 2.0, radius)),
         ShapeKind::Cable => Geometry::cable(radius, points.as_deref().unwrap_or_default()),
     })
 }

@@ -5,7 +5,7 @@
 
 use parry3d_f64::math::{Pose3, Rot3, Vec3};
 use parry3d_f64::query::{PointQuery, PointQueryWithLocation, Ray, RayCast};
-use parry3d_f64::shape::{Ball, Capsule, Compound, Cuboid, HalfSpace, Polyline, Shape, SharedShape, TriMesh};
+use parry3d_f64::shape::{Ball, Capsule, Compound, Cuboid, Cylinder, HalfSpace, Polyline, Shape, SharedShape, TriMesh};
 use tactflow_runtime::signal::Pose;
 
 /// The geometry of an object, in its own frame [m].
@@ -18,6 +18,8 @@ pub enum Geometry {
     Box(Cuboid),
     /// A cylinder with round ends along y, centred at the origin.
     Pen(Capsule),
+    /// A cylinder with sharp rims along y, centred at the origin.
+    Disc(Cylinder),
     /// An ellipsoid centred at the origin.
     Ellipsoid(Ellipsoid),
     /// A round cable.
@@ -49,7 +51,7 @@ pub struct Hit {
     pub normal: Vec3,
 }
 
-/// The line of an object: the axis of a pen, an edge of a box, the course of a cable.
+/// The line of an object: the axis of a pen, an edge of a box, a rim of a disc, the course of a cable.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ObjectLine {
     /// Nearest point of the line.
@@ -99,6 +101,7 @@ impl Geometry {
             Self::Ball(shape) => shape,
             Self::Box(shape) => shape,
             Self::Pen(shape) => shape,
+            Self::Disc(shape) => shape,
             Self::Ellipsoid(Ellipsoid { mesh, .. }) => mesh,
             Self::Cable(cable) => &cable.capsules,
         }
@@ -163,6 +166,7 @@ impl Geometry {
                 let at = shape.segment.project_local_point(point, true).point;
                 Some(ObjectLine { at, along: Vec3::Y })
             }
+            Self::Disc(shape) => Some(rim(shape, point)),
             Self::Cable(cable) => {
                 let (projected, (segment, place)) = cable.line.project_local_point_and_get_location(point, true);
                 // The directions of the pieces would jump by 4 degrees in a bend of 44 mm radius.
@@ -188,6 +192,13 @@ fn edge(half: Vec3, point: Vec3) -> ObjectLine {
         ObjectLine { at, along }
     });
     lines.min_by(|a, b| a.at.distance(point).total_cmp(&b.at.distance(point))).expect("a box has edges")
+}
+
+/// Returns the rim of a disc nearest to a point, with its tangent there.
+fn rim(disc: &Cylinder, point: Vec3) -> ObjectLine {
+    let away = Vec3::new(point.x, 0.0, point.z).try_normalize().unwrap_or(Vec3::X);
+    let at = away * disc.radius + Vec3::Y * disc.half_height.copysign(point.y);
+    ObjectLine { at, along: Vec3::Y.cross(away) }
 }
 
 /// Returns the corners of a polyline along the Catmull-Rom spline through `points`, and the direction of the spline at
@@ -239,6 +250,7 @@ mod tests {
             (Geometry::Ball(Ball::new(0.05)), v(0.03, 0.0, -0.1), 0.06, v(0.6, 0.0, -0.8)),
             (Geometry::Box(Cuboid::new(v(0.1, 0.1, 0.02))), v(0.05, -0.05, -0.05), 0.03, v(0.0, 0.0, -1.0)),
             (Geometry::pen(0.005, 0.1), v(0.003, 0.02, -0.05), 0.046, v(0.6, 0.0, -0.8)),
+            (Geometry::Disc(Cylinder::new(0.02, 0.05)), v(0.03, 0.01, -0.1), 0.06, v(0.6, 0.0, -0.8)),
             (cable, v(0.0018, 0.02, -0.05), 0.0476, v(0.6, 0.0, -0.8)),
         ];
         for (shape, origin, time, normal) in cases {
@@ -272,6 +284,7 @@ mod tests {
             Geometry::Ball(Ball::new(0.05)),
             Geometry::Box(Cuboid::new(v(0.1, 0.1, 0.02))),
             Geometry::pen(0.005, 0.1),
+            Geometry::Disc(Cylinder::new(0.02, 0.05)),
             Geometry::ellipsoid([0.08, 0.05, 0.03]),
             Geometry::cable(0.003, &[[0.0, -0.1, 0.0], [0.02, 0.0, 0.0], [0.0, 0.1, 0.0]]),
         ];
@@ -285,13 +298,19 @@ mod tests {
     }
 
     #[test]
-    fn pens_boxes_and_cables_have_lines() {
+    fn pens_boxes_discs_and_cables_have_lines() {
         let pen = Geometry::pen(0.005, 0.1);
         let line = pen.line(v(0.01, 0.02, -0.01)).unwrap();
         assert!(line.at.distance(v(0.0, 0.02, 0.0)) < 1e-12 && line.along == Vec3::Y, "{line:?}");
         let block = Geometry::Box(Cuboid::new(v(0.1, 0.1, 0.02)));
         let line = block.line(v(0.08, 0.03, -0.03)).unwrap();
         assert_eq!((line.at, line.along), (v(0.1, 0.03, -0.02), Vec3::Y));
+        let disc = Geometry::Disc(Cylinder::new(0.02, 0.05));
+        let line = disc.line(v(0.04, -0.01, -0.03)).unwrap();
+        assert!(
+            line.at.distance(v(0.04, -0.02, -0.03)) < 1e-12 && line.along.distance(v(-0.6, 0.0, -0.8)) < 1e-12,
+            "{line:?}"
+        );
         let circle: Vec<[f64; 3]> =
             (0..=20).map(|i| f64::from(i) * 0.05).map(|a| [0.2 * a.sin(), -0.2 * a.cos(), 0.0]).collect();
         let cable = Geometry::cable(0.003, &circle);

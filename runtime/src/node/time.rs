@@ -36,11 +36,16 @@ impl Absence {
     /// Records whether it is present in this tick. Returns whether it has been absent for the graph's `reset_after_ms`.
     /// The result is `false` again in the tick in which it returns.
     pub fn is_long(&mut self, is_present: bool, tick: &Tick) -> bool {
+        self.is_longer(tick.reset_after, is_present, tick)
+    }
+
+    /// Does the same for a time of its own [ns].
+    pub fn is_longer(&mut self, time: i64, is_present: bool, tick: &Tick) -> bool {
         if is_present {
             self.since = None;
             return false;
         }
-        tick.now - *self.since.get_or_insert(tick.now) >= tick.reset_after
+        tick.now - *self.since.get_or_insert(tick.now) >= time
     }
 
     /// Records that it is absent from the time `since` [ns] on. An absence that has begun earlier continues.

@@ -230,7 +230,7 @@ pub(super) fn poor_gains() -> Vec<(&'static str, Variant)> {
         ("slow-filter", variant("hybrid", &[slow])),
         ("slow-filter", variant("edge", &[slow])),
         ("slow-filter", on("pen", variant("force", &[slow]))),
-        ("slow-filter", variant("edge", &["set parts.touch.set.orientation.window=250"])),
+        ("slow-filter", variant("edge", &["set nodes.direction.window=250"])),
         ("slow-filter", variant("cable", &["set nodes.direction.window=250"])),
         ("unfiltered-derivative", variant("hybrid", &["gains.x = { kp = 3.5, kd = 0.1 }"])),
         ("unfiltered-derivative", variant("position", &["gains.y = { kp = 3.5, kd = 0.05 }"])),

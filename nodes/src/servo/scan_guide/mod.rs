@@ -28,13 +28,20 @@ use scan::{Moved, Scan};
 /// in the middle stops it at an edge. The scan then continues with the next leg. A step across that moves less than
 /// half of its width is the end of the surface, and of the scan.
 ///
+/// **Pace.** The guide waits for the contact: while it is behind the middle of the pad, the sensor moves more slowly, at
+/// half of `edge_m` with half the speed, and with a quarter of it at least. So the controllers that roll and slide the
+/// sensor keep up where the surface curves much. This needs `in.x` and `in.y`.
+///
 /// **A cap.** With `max_tilt_rad`, a leg along the strokes also ends where the sensor is inclined by more than this to
 /// where the scan began. So strokes are as long as the surface is flat enough: `stroke_m` and `strokes` are then upper
 /// bounds. The first leg across ends there too, and the scan ends after a stroke that nowhere was flat enough.
 ///
 /// **One scan** begins with the contact, when a mode sets a speed, and when a mode sets another axis. To scan across
 /// and along, use two modes that set `axis`, each with `go` or `done = { when = "scan.done" }`. A scan is abandoned
-/// when the gate is not set for `reset_after_ms`, or at a speed of 0. Flicker of the gate only pauses it.
+/// when the gate is not set for `abandon_after_ms`, or at a speed of 0. Flicker of the gate only pauses it.
+///
+/// **A lost contact.** A mode that finds the contact again, at any speed but 0, continues the scan within
+/// `abandon_after_ms`. A stroke during which the contact was lost for `reset_after_ms` has ended there.
 ///
 /// The twist is as old as the gate, so it ends with the contact and when the pad stops sending images. Guidance along a
 /// component that the projector controls leaves an offset of v / kp on the pad.
@@ -81,6 +88,9 @@ pub struct Params {
     /// A stroke ends where the sensor is inclined by more than this to where the scan began. Without it, none does.
     #[param(unit = "rad", range = 0.01..=1.5)]
     max_tilt_rad: Option<f64>,
+    /// Time without the gate after which a scan is abandoned; the `reset_after_ms` of the graph if not given.
+    #[param(unit = "ms", above = 0.0)]
+    abandon_after_ms: Option<f64>,
 }
 
 /// An axis of the sensor.
@@ -144,8 +154,10 @@ pub struct Outputs {
 pub struct State {
     /// The scan in progress.
     scan: Option<Scan>,
-    /// Of the contact.
+    /// Of the contact, until the scan is abandoned.
     absence: Absence,
+    /// Of the contact, until its stroke ends.
+    loss: Absence,
 }
 
 impl Node for ScanGuide {
@@ -161,7 +173,13 @@ impl Node for ScanGuide {
 
     fn step(&self, tick: &Tick, inputs: Inputs<'_>, out: &mut Outputs, state: &mut State) {
         let Params { speed_m_per_s: speed, axis, .. } = self.params;
-        let is_over = state.absence.is_long(*inputs.gate, tick);
+        let patience = self.params.abandon_after_ms.map_or(tick.reset_after, |time| (time * 1e6) as i64);
+        let is_over = state.absence.is_longer(patience, *inputs.gate, tick);
+        if state.loss.is_long(*inputs.gate, tick)
+            && let Some(scan) = &mut state.scan
+        {
+            scan.contact_is_lost();
+        }
         if is_over || speed <= 0.0 || state.scan.is_some_and(|scan| scan.axis != axis) {
             state.scan = None;
         }
@@ -178,7 +196,7 @@ impl Node for ScanGuide {
             };
             scan.advance(&self.params, moved, tick);
             if let Some(leg) = scan.leg {
-                let [u, v] = leg.velocity(speed);
+                let [u, v] = leg.velocity(speed * scan.pace(&self.params, moved.contact));
                 let [x, y] = [0, 1].map(|i| along[i] * u + across[i] * v);
                 out.twist.set(Twist([x, y, 0.0, 0.0, 0.0, 0.0].into()));
             }

@@ -65,6 +65,8 @@ pub(super) struct Leg {
 
 /// Time for which the contact must be behind at an edge, so that one image with another contact is not an edge [ns].
 const EDGE_NS: i64 = 40_000_000;
+/// Smallest fraction of the speed, above that of a sensor that makes no progress [1].
+const MIN_PACE: f64 = 0.25;
 /// Number of the leg that is the first stroke.
 const FIRST_STROKE: usize = 2;
 
@@ -100,12 +102,24 @@ impl Scan {
         let is_edge = self.is_edge(contact.is_some_and(|at| at[leg.side] * leg.sign() < -params.edge_m), tick);
         let way = (at - leg.from) * leg.sign();
         let is_steep = self.is_steep(params, leg, way, tilt);
-        if !is_at_end && !is_edge && !is_steep && !self.stall.is_stuck(way, params.speed_m_per_s, tick) {
+        let is_stuck = self.stall.is_stuck(way, params.speed_m_per_s, tick);
+        if !is_at_end && !is_edge && !is_steep && !is_stuck {
             return;
         }
         self.leg = if self.is_surface_end(params, leg) { None } else { Leg::new(params, self.number + 1, self.at) };
         self.number += 1;
         (self.stall, self.edge_since, self.start_tilt, self.was_flat) = Default::default();
+    }
+
+    /// Records that the contact is lost. What the sensor does not move meanwhile is no stall.
+    pub(super) fn contact_is_lost(&mut self) {
+        (self.stall, self.edge_since) = Default::default();
+    }
+
+    /// Returns the fraction of the speed at which the contact keeps up.
+    pub(super) fn pace(&self, params: &Params, contact: Option<[f64; 2]>) -> f64 {
+        let (Some(leg), Some(at)) = (self.leg, contact) else { return 1.0 };
+        (1.0 + at[leg.side] * leg.sign() / params.edge_m).clamp(MIN_PACE, 1.0)
     }
 
     /// Returns whether a leg ends because the surface is too steep. A leg that begins on a steep surface ends only where

@@ -245,8 +245,13 @@ fn one_image_with_another_contact_is_not_an_edge() {
 
 #[test]
 fn flicker_pauses_the_scan_and_a_loss_restarts_it() {
-    for (ms, goes_on) in [(12, true), (40, false)] {
-        let mut scene = ScanScene::new(SCAN);
+    for (ms, patience, goes_on) in [
+        (12, "", true),
+        (40, "", false),
+        (4000, "abandon_after_ms = 5000", true),
+        (5000, "abandon_after_ms = 5000", false),
+    ] {
+        let mut scene = ScanScene::new(&format!("{SCAN}\n{patience}"));
         while scene.rig.get::<f64>("progress").is_none_or(|progress| *progress < 0.4) {
             scene.step(4.0, 1.0);
         }
@@ -255,9 +260,31 @@ fn flicker_pauses_the_scan_and_a_loss_restarts_it() {
             scene.rig.step_ms(4.0);
             assert_eq!(scene.rig.get::<Twist>("twist"), None, "no contact, no motion");
         }
+        let turns = scene.turns.len();
         scene.step(4.0, 1.0);
-        assert_eq!(*scene.rig.get::<f64>("progress").unwrap() > 0.3, goes_on, "{ms} ms");
-        assert!(scene.rig.get::<Twist>("twist").is_some(), "{ms} ms");
+        assert_eq!(*scene.rig.get::<f64>("progress").unwrap() > 0.3, goes_on, "{ms} ms {patience}");
+        assert!(scene.rig.get::<Twist>("twist").is_some(), "{ms} ms {patience}");
+        assert_eq!(
+            scene.turns.len() == turns,
+            goes_on,
+            "a stroke goes on where the contact was lost: {ms} ms {patience}"
+        );
+    }
+}
+
+#[test]
+fn the_guide_waits_for_a_contact_that_is_behind() {
+    // The first leg moves along -y, and the contact is behind on the side of +y.
+    for (y, pace) in [(-0.01, 1.0), (0.0, 1.0), (0.005, 0.75), (0.01, 0.5), (0.019, 0.25)] {
+        let mut scene = ScanScene::new(SCAN);
+        for (name, place) in [("x", 0.02), ("y", y)] {
+            scene.rig.set(name, place);
+        }
+        scene.rig.set("gate", true);
+        scene.rig.set("pose", Pose(scene.pose));
+        scene.rig.step_ms(4.0);
+        let speed = scene.rig.get::<Twist>("twist").unwrap().linear().norm();
+        assert!((speed - pace * 0.02).abs() < 1e-12, "{y} m: {speed} m/s");
     }
 }
 
@@ -296,6 +323,7 @@ fn another_axis_begins_another_scan() {
         step_m: 0.01,
         edge_m: 0.02,
         max_tilt_rad: None,
+        abandon_after_ms: None,
     };
     let (across, along) = (Scan::new(&params(StrokeAxis::X)), Scan::new(&params(StrokeAxis::Y)));
     let mut done = across;
