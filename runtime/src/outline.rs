@@ -116,6 +116,9 @@ pub struct OutlinedBlock {
     pub settings: Vec<Setting>,
     /// The outputs of a node.
     pub outputs: Vec<OutlinedPort>,
+    /// Nominal time between two samples behind its outputs, at least that between two ticks [s]; 0 for a device.
+    #[serde(skip)]
+    pub sample_s: f64,
 }
 
 /// An output of a node.

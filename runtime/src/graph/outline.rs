@@ -104,6 +104,7 @@ impl OutlineBuilder<'_> {
             name: node.name.clone(),
             wires,
             outputs,
+            sample_s: planned.sample_s,
             ..self.block(&node.block, &spec.params, Some(planned.index))?
         })
     }
@@ -143,6 +144,7 @@ impl OutlineBuilder<'_> {
             wires: Vec::new(),
             settings: self.table(block.params.as_table(), specs, "", node),
             outputs: Vec::new(),
+            sample_s: 0.0,
         })
     }
 

@@ -230,6 +230,22 @@ pub(super) fn poor_gains() -> Vec<(&'static str, Variant)> {
         ("slow-filter", variant("hybrid", &[slow])),
         ("slow-filter", variant("edge", &[slow])),
         ("slow-filter", on("pen", variant("force", &[slow]))),
+        // The gain is too large for the period of a slow pad, and not for that of the graph.
+        (
+            "low-margin",
+            variant(
+                "two_arms",
+                &[
+                    "set devices.right.rate_hz=25",
+                    "set parts.right.set.stiffness.lag_ms=200",
+                    "set parts.right.set.pid.gains.x.kp=40",
+                    "set parts.right.set.pid.gains.x.rise=20",
+                ],
+            ),
+        ),
+        ("unusual-gain", on("pen", variant("force", &["gains.pressure = { kp = 0.5, limit = 0.0002 }"]))),
+        ("unreachable-setpoint", variant("force", &["set limits.blind_mm=4.0"])),
+        ("unforced-rolling", variant("explore", &["set modes.scan.set.projector.select=[0, 0, 0, 0, 0, 1]"])),
         ("slow-filter", variant("edge", &["set nodes.direction.window=250"])),
         ("slow-filter", variant("cable", &["set nodes.direction.window=250"])),
         ("unfiltered-derivative", variant("hybrid", &["gains.x = { kp = 3.5, kd = 0.1 }"])),

@@ -79,9 +79,10 @@ mod tests {
             column: [0.0, 0.0, 1.0, 0.0, 0.0, 0.0],
             kp: 1.0,
             ki,
+            period_s: 1e-4,
             ..Feature::default()
         };
-        Loop::new(&feature, &Answer { vz: Some(gain), ..Answer::default() }, delay, 1e-4)
+        Loop::new(&feature, &Answer { vz: Some(gain), ..Answer::default() }, delay)
     }
 
     #[test]

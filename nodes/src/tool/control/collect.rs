@@ -71,8 +71,8 @@ impl Passage {
     /// Returns the way before a delay.
     fn delayed(&self, nodes: &Nodes<'_>, node: &OutlinedBlock) -> Self {
         let mut passage = self.clone();
-        let (node, kind, shape) = (node.name.clone(), node.kind.text.clone(), Shape::Delay { samples: 1.0 });
-        passage.delays.push(Filter { node, kind, delay_s: shape.delay(nodes.period()), shape });
+        let (node, kind, shape) = (node.name.clone(), node.kind.text.clone(), Shape::Delay { time: nodes.period() });
+        passage.delays.push(Filter { node, kind, delay_s: nodes.period(), shape });
         passage
     }
 

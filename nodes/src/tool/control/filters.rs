@@ -60,7 +60,7 @@ fn follow<'a>(nodes: &Nodes<'a>, port: &str, path: &mut Vec<&'a str>) -> Option<
         }),
         kind => shape(nodes, node).zip(source(node, "value")).map_or_else(measured, |(shape, value)| {
             let mut found = follow(nodes, value, path)?;
-            let delay_s = shape.delay(nodes.period());
+            let delay_s = shape.delay(node.sample_s);
             found.filters.push(Filter { node: node.name.clone(), kind: kind.to_owned(), delay_s, shape });
             Some(found)
         }),
@@ -84,7 +84,7 @@ fn slower(sides: Vec<Way>) -> Option<Way> {
 fn shape(nodes: &Nodes<'_>, node: &OutlinedBlock) -> Option<Shape> {
     let number = |path: &str| nodes.number(node, path);
     let samples = |usual: f64| match number("window_ms") {
-        Some(ms) => (ms * 1e-3 / nodes.period()).round().max(1.0),
+        Some(ms) => (ms * 1e-3 / node.sample_s).round().max(1.0),
         None => number("window").unwrap_or(usual),
     };
     match node.kind.text.as_str() {
@@ -94,7 +94,7 @@ fn shape(nodes: &Nodes<'_>, node: &OutlinedBlock) -> Option<Shape> {
             .map(|time| Shape::LowPass { time }),
         "moving_average" => Some(Shape::Mean { samples: samples(10.0) }),
         "median" => Some(Shape::Median { samples: samples(5.0) }),
-        "delay" => Some(Shape::Delay { samples: 1.0 }),
+        "delay" => Some(Shape::Delay { time: nodes.period() }),
         _ => None,
     }
 }

@@ -42,6 +42,9 @@ pub(crate) struct Feature {
     /// The node that compares it with its setpoint.
     #[serde(skip)]
     pub(crate) compared: Option<String>,
+    /// Nominal time between two samples of its error [s].
+    #[serde(skip)]
+    pub(crate) period_s: f64,
     /// Filters from the measurement to the motion.
     pub(crate) filters: Vec<Filter>,
     /// The flags without which it moves nothing.
@@ -223,7 +226,9 @@ pub(super) fn feature<'a>(nodes: &Nodes<'a>, jacobian: &'a OutlinedBlock, name: 
     let behind = pid.map(|pid| before(pid, "error", "deadband").unwrap_or(pid));
     let error = behind.and_then(|node| before(node, "error", "feature_error"));
     let setpoint = error.and_then(|error| setpoint(nodes, &error.name, &name));
-    let way = error.and_then(|error| source(error, &name)).map(|port| way(nodes, port));
+    let port = error.and_then(|error| source(error, &name));
+    let period_s = port.map_or(nodes.period(), |port| nodes.sample_period(port));
+    let way = port.map(|port| way(nodes, port));
     let measured = way.as_ref().map(|way| way.measured.clone());
     let (filters, gates) = way.map(|way| (way.filters, way.gates)).unwrap_or_default();
     let (sides, mount) = (Vec::new(), None);
@@ -242,6 +247,7 @@ pub(super) fn feature<'a>(nodes: &Nodes<'a>, jacobian: &'a OutlinedBlock, name: 
         rise,
         measured,
         setpoint,
+        period_s,
         filters,
         gates,
         mount,

@@ -168,11 +168,17 @@ mod tests {
 
     /// The loop k / s, with a period that hardly counts, a delay [s] and a resonance.
     fn integrator(kp: f64, ki: f64, delay: f64, resonance: Option<(f64, f64)>, period: f64) -> Margins {
-        let feature =
-            Feature { name: "x".into(), column: [-1.0, 0.0, 0.0, 0.0, 0.0, 0.0], kp, ki, ..Feature::default() };
+        let feature = Feature {
+            name: "x".into(),
+            column: [-1.0, 0.0, 0.0, 0.0, 0.0, 0.0],
+            kp,
+            ki,
+            period_s: period,
+            ..Feature::default()
+        };
         let (hz, damping) = resonance.unzip();
         let answer = Answer { vx: Some(-1.0), resonance_hz: hz, damping_ratio: damping, ..Answer::default() };
-        margins(&Loop::new(&feature, &answer, delay, period))
+        margins(&Loop::new(&feature, &answer, delay))
     }
 
     fn near(value: Option<f64>, wanted: f64, share: f64) {

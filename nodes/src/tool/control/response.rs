@@ -38,21 +38,21 @@ pub(crate) struct Loop {
 impl Loop {
     /// Returns the loop of a feature over a contact; `None` if neither the bench nor geometry says how the feature
     /// answers the motion of its column, or if a schedule multiplies the gains by what is not known.
-    pub(crate) fn over(feature: &Feature, contact: &Contact, period: f64) -> Option<Self> {
+    pub(crate) fn over(feature: &Feature, contact: &Contact) -> Option<Self> {
         let answer = contact.answer(feature.quantity()?)?;
         let latency_ms = answer.latency_ms.unwrap_or(contact.latency_ms);
         let (copies, others): (Vec<&Feature>, Vec<&Feature>) =
             feature.beside.iter().partition(|other| other.is_same_control(feature));
         // The same control that moves the arm by several nodes.
         let column = std::array::from_fn(|i| feature.column[i] + copies.iter().map(|copy| copy.column[i]).sum::<f64>());
-        let around = Self::new(&Feature { column, ..feature.clone() }, &answer, latency_ms * 1e-3, period);
+        let around = Self::new(&Feature { column, ..feature.clone() }, &answer, latency_ms * 1e-3);
         let factors = feature.schedules.iter().map(|schedule| schedule.factor(&answer));
         let factor = factors.product::<Option<f64>>()?;
         let mut beside = Vec::new();
         for other in others {
             let other = Feature { beside: Vec::new(), ..other.clone() };
             // One that only moves what does not change the feature adds nothing.
-            let around = Self::over(&other, contact, period).filter(|_| answer.along(&other.column) != 0.0);
+            let around = Self::over(&other, contact).filter(|_| answer.along(&other.column) != 0.0);
             // Of another measurement nothing may be known.
             let is_needed = answer.along(&other.column) != 0.0 && other.measured == feature.measured;
             if is_needed && around.is_none() {
@@ -64,10 +64,10 @@ impl Loop {
         (around.gain != 0.0).then_some(Self { beside, ..around.times(factor) })
     }
 
-    /// Returns the loop of a feature, with the latency and the period [s].
-    pub(crate) fn new(feature: &Feature, answer: &Answer, latency: f64, period: f64) -> Self {
+    /// Returns the loop of a feature, with the latency [s].
+    pub(crate) fn new(feature: &Feature, answer: &Answer, latency: f64) -> Self {
         let gain = answer.along(&feature.column);
-        let Feature { kp, ki, kd, .. } = *feature;
+        let Feature { kp, ki, kd, period_s: period, .. } = *feature;
         let shapes = feature.filters.iter().map(|filter| filter.shape).collect();
         let (resonance, measured, beside) = (answer.resonance(), Vec::new(), Vec::new());
         let is_same_measurement = true;
@@ -235,10 +235,11 @@ mod tests {
             kp: 0.5,
             ki: 0.4,
             kd: 0.02,
+            period_s: 0.004,
             filters: [Shape::Mean { samples: 10.0 }, Shape::LowPass { time: 0.1 }].map(filter).into(),
             ..Feature::default()
         };
-        let around = Loop::new(&feature, &answer, 0.0, 0.004);
+        let around = Loop::new(&feature, &answer, 0.0);
         for samples in [400, 200, 100, 50, 20] {
             let omega = 2.0 * std::f64::consts::PI / (0.004 * samples as f64);
             let (open, ran) = (around.open(omega), in_time(samples));

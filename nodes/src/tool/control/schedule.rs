@@ -36,7 +36,7 @@ impl Schedule {
     }
 
     /// Returns the factor over a contact with this answer; `None` if it is not known.
-    pub(super) fn factor(&self, answer: &Answer) -> Option<f64> {
+    pub(crate) fn factor(&self, answer: &Answer) -> Option<f64> {
         let nominal = self.nominal?;
         // A contact that does not answer more to a larger travel has no estimate.
         let ratio = answer.vz.map(|vz| vz / nominal).filter(|ratio| *ratio > 0.0);

@@ -22,8 +22,8 @@ pub(crate) enum Shape {
     },
     /// The value some time ago.
     Delay {
-        /// Number of samples.
-        samples: f64,
+        /// The time [s].
+        time: f64,
     },
 }
 
@@ -37,9 +37,8 @@ impl Shape {
     /// low-pass, and half of a window.
     pub(crate) fn delay(self, period: f64) -> f64 {
         match self {
-            Self::LowPass { time } => time,
+            Self::LowPass { time } | Self::Delay { time } => time,
             Self::Mean { samples } | Self::Median { samples } => (samples - 1.0) / 2.0 * period,
-            Self::Delay { samples } => samples * period,
         }
     }
 
@@ -75,7 +74,7 @@ mod tests {
         assert!((mean.response(omega, 0.004) - sum / 10.0).norm() < 1e-12);
         let low = Shape::LowPass { time: 0.1 };
         assert!((low.response(10.0, 1e-5).norm() - 0.5_f64.sqrt()).abs() < 1e-4);
-        for shape in [mean, low, Shape::Median { samples: 5.0 }, Shape::Delay { samples: 1.0 }] {
+        for shape in [mean, low, Shape::Median { samples: 5.0 }, Shape::Delay { time: 0.004 }] {
             let slow = shape.response(0.1, 1e-4);
             assert!((slow.arg() + 0.1 * shape.delay(1e-4)).abs() < 1e-5, "{shape:?}");
         }

@@ -125,7 +125,7 @@ fn motion(compiled: &Compiled, index: &Index<'_>, of: String, command: Command<'
         let law = law(&nodes, &twist);
         Ok(ModeLaw {
             mode: mode.map(|mode| mode.name.clone()),
-            loops: stability(&declared, &law, nodes.period()),
+            loops: stability(&declared, &law),
             approaches: approaches(&nodes, &limits, &law, &declared),
             law,
             ends: mode.map(ends).unwrap_or_default(),

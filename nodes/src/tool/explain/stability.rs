@@ -23,7 +23,7 @@ pub(super) struct Stability {
 }
 
 /// Returns the margins of all features that a law controls, with the contacts that the bench declares for the arm.
-pub(super) fn stability(declared: &[Contact], law: &Law, period: f64) -> Vec<Stability> {
+pub(super) fn stability(declared: &[Contact], law: &Law) -> Vec<Stability> {
     let alone = [Contact::by_geometry()];
     let declared = if declared.is_empty() { &alone[..] } else { declared };
     let controlled: Vec<&Feature> = law.features.iter().filter(|feature| feature.moves()).collect();
@@ -33,7 +33,7 @@ pub(super) fn stability(declared: &[Contact], law: &Law, period: f64) -> Vec<Sta
             feature: feature.name.clone(),
             by_geometry: feature.quantity().is_some_and(|quantity| contact.is_by_geometry(quantity)),
             is_unknown: feature.schedules.iter().any(|schedule| schedule.nominal.is_none()),
-            margins: Loop::over(feature, contact, period).map(|around| margins(&around)),
+            margins: Loop::over(feature, contact).map(|around| margins(&around)),
         })
     });
     loops.collect()

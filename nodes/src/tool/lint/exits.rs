@@ -19,6 +19,11 @@ impl<'a> ModeLaw<'a> {
         self.all("go").chain(self.all("done"))
     }
 
+    /// Returns the exits that end the task with a failure.
+    pub(super) fn fails(&self) -> impl Iterator<Item = Exit<'a>> {
+        self.all("fail")
+    }
+
     /// Returns the exits that are taken when the contact is lost.
     pub(super) fn lost(&self) -> impl Iterator<Item = Exit<'a>> {
         self.exits("on_lost").chain(self.releases())
@@ -36,7 +41,7 @@ impl<'a> ModeLaw<'a> {
 
     /// Returns whether any exit waits for the value of a port.
     pub(super) fn watches(&self) -> bool {
-        self.conditions().chain(self.all("fail")).any(|exit| exit.entry("when").is_some())
+        self.conditions().chain(self.fails()).any(|exit| exit.entry("when").is_some())
     }
 
     /// Returns whether an exit waits for a contact.

@@ -72,6 +72,8 @@ fn limited(mode: &ModeLaw<'_>, feature: &Feature, quantity: &str, gain: f64) -> 
     let (usual, unit) = match quantity {
         "x" | "y" => (0.01_f64.min(mode.farthest(feature)?), "m"),
         "orientation" => (0.5, "rad"),
+        // At the first touch the error is the setpoint.
+        "pressure" | "force" => (feature.setpoint.filter(|setpoint| *setpoint > 0.0)?, "N"),
         _ => return None,
     };
     let limit = mode.gain(feature, "limit")?;
@@ -90,7 +92,7 @@ fn limited(mode: &ModeLaw<'_>, feature: &Feature, quantity: &str, gain: f64) -> 
 
 /// Returns the warning about a derivative of a feature that no filter smooths.
 fn unfiltered(mode: &ModeLaw<'_>, feature: &Feature) -> Option<Diagnostic> {
-    let period = mode.nodes.period();
+    let period = feature.period_s;
     // The difference of two samples has √2 times their noise.
     let factor = 2.0_f64.sqrt() * feature.kd / period;
     // A filter of less than a period smooths nothing, and a share below that of `kp` does no harm.

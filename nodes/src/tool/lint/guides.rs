@@ -23,6 +23,11 @@ pub(super) fn is_composed(guide: &Guidance) -> bool {
     guide.kind == "compose_twist"
 }
 
+/// Returns whether a node rolls the sensor over a surface.
+pub(super) fn rolls_along(guide: &Guidance) -> bool {
+    guide.kind == "follow_surface"
+}
+
 /// Returns whether a node moves the sensor away from the object to its place of rest. Its gate may be closed.
 pub(super) fn parks(nodes: &Nodes<'_>, guide: &Guidance) -> bool {
     guide.kind == "park" && guide.passes[2] && !rests(nodes, guide)

@@ -15,6 +15,7 @@
 //! | can the contacts of the bench be read? | `contacts` |
 //! | does a mode roll without a force? | `rolling` |
 //! | does a mode wait for a contact without a motion? | `approach` |
+//! | does the blind limit stop a search before it fails? | `blind` |
 //! | is a setpoint or a threshold out of reach? | `reach` |
 //! | does an exit wait for too large a force? | `exit_bounds` |
 //! | does a feature always rest in a deadband, or move through it? | `deadbands` |
@@ -32,6 +33,7 @@
 
 mod approach;
 mod arm;
+mod blind;
 mod contacts;
 mod deadbands;
 mod exit_bounds;
@@ -99,7 +101,8 @@ pub(crate) fn lint(outline: &Outline, facts: &[(String, toml::Value)]) -> Diagno
 
 /// Returns the warnings about modes that lose their contact, or that never touch.
 fn touches(arm: &Arm<'_>) -> Diagnostics {
-    arm.modes.iter().flat_map(|mode| [rolling::check(arm, mode), approach::check(arm, mode)]).flatten().collect()
+    let of_mode = |mode| [rolling::check(arm, mode), approach::check(arm, mode), blind::check(arm, mode)];
+    arm.modes.iter().flat_map(of_mode).flatten().collect()
 }
 
 /// Returns the warnings about columns and about what projectors select of them.

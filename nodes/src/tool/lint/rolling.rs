@@ -5,10 +5,10 @@ use std::ops::Range;
 use tactflow_runtime::source::{Code, Diagnostic};
 
 use super::arm::Arm;
-use super::guides::{is_composed, may_press};
+use super::guides::{is_composed, may_press, rolls_along};
 use super::mode_law::ModeLaw;
 use crate::motion::COMPONENTS;
-use crate::tool::control::law::Feature;
+use crate::tool::control::law::{Feature, Guidance};
 
 /// Returns the warning about a mode that rolls the sensor over an object while nothing controls the force.
 pub(super) fn check(arm: &Arm<'_>, mode: &ModeLaw<'_>) -> Option<Diagnostic> {
@@ -41,10 +41,10 @@ fn roller(mode: &ModeLaw<'_>) -> Option<(String, usize, Range<usize>)> {
         Some((feature.name.clone(), i, mode.place_of_column(feature)))
     });
     let has_contact = || mode.exits("on_lost").next().is_some();
-    // A generated motion, such as a sine.
+    // A generated motion, such as a sine, or a motion over a surface.
     let generated = || {
-        let mut composed = mode.law.guidance.iter().filter(|guide| is_composed(guide) && has_contact());
-        composed.find_map(|guide| {
+        let rolls = |guide: &&Guidance| rolls_along(guide) || is_composed(guide);
+        mode.law.guidance.iter().filter(rolls).filter(|_| has_contact()).find_map(|guide| {
             let i = [3, 4].into_iter().find(|i| guide.passes[*i])?;
             Some((guide.node().to_owned(), i, mode.nodes.node(guide.node())?.span.clone()))
         })

@@ -76,8 +76,7 @@ pub(super) fn check(arm: &Arm<'_>) -> Diagnostics {
     // Most modes have the same loops.
     let mut seen = BTreeSet::new();
     for mode in &arm.modes {
-        let period = mode.nodes.period();
-        for feature in mode.moving().filter(|feature| feature.kp > 0.0 && feature.kp * period < DIVERGES) {
+        for feature in mode.moving().filter(|feature| feature.kp > 0.0 && feature.kp * feature.period_s < DIVERGES) {
             let is_judged = is_known(mode, feature, contacts) && is_largest(feature, contacts);
             if is_judged && seen.insert(key(feature)) {
                 found.extend(judge(mode, feature, contacts));
@@ -117,8 +116,7 @@ fn key(feature: &Feature) -> (String, String, Vec<u64>) {
 }
 
 fn judge(mode: &ModeLaw<'_>, feature: &Feature, contacts: &[Contact]) -> Option<Diagnostic> {
-    let period = mode.nodes.period();
-    let loops = contacts.iter().filter_map(|contact| Some((contact, Loop::over(feature, contact, period)?)));
+    let loops = contacts.iter().filter_map(|contact| Some((contact, Loop::over(feature, contact)?)));
     let loops: Vec<(&Contact, Loop)> = loops.filter(|(_, around)| !around.is_reversed()).collect();
     let all: Vec<Found<'_>> = loops
         .iter()
@@ -182,6 +180,9 @@ fn low_margin(
         let note = format!("the loop of `{}` adds to it: both {why}", other.name);
         diagnostic.note(mode.place_of_gain(other, "kp"), note)
     });
+    let diagnostic = scheduled(mode, feature, contacts, low.object)
+        .into_iter()
+        .fold(diagnostic, |diagnostic, (place, note)| diagnostic.note(place, note));
     let loops: Vec<Loop> = loops.iter().map(|(_, around)| around.clone()).collect();
     if let Some((kd, without)) = undamped(mode, feature, &loops) {
         return diagnostic
@@ -203,6 +204,23 @@ fn low_margin(
     places.into_iter().fold(diagnostic.help(help), |diagnostic, (place, gain)| {
         diagnostic.edit(Edit::Replace(place, format!("{gain:?}")))
     })
+}
+
+/// Returns what to say of each schedule that makes the gains larger over an object.
+fn scheduled(
+    mode: &ModeLaw<'_>,
+    feature: &Feature,
+    contacts: &[Contact],
+    object: Option<&str>,
+) -> Vec<(Range<usize>, String)> {
+    let contact = contacts.iter().find(|contact| contact.name() == object);
+    let Some(answer) = contact.and_then(|contact| contact.answer(feature.quantity()?)) else { return Vec::new() };
+    let larger = feature.schedules.iter().filter_map(|schedule| {
+        let factor = schedule.factor(&answer).filter(|factor| *factor > 1.0)?;
+        let note = format!("`{}` multiplies the gains by {factor:.1} {}", schedule.node, over(object));
+        Some((mode.place(&schedule.node, "max"), note))
+    });
+    larger.collect()
 }
 
 /// Returns the place of a derivative gain that alone takes the margins of all loops, and what stands there without it.
@@ -243,7 +261,7 @@ fn slow_filter(mode: &ModeLaw<'_>, feature: &Feature, contacts: &[Contact], slow
     );
     let place = mode.place(&slowest.node, key.unwrap_or_default());
     let diagnostic = Diagnostic::new(Code::SlowFilter, place.clone(), message);
-    let share = faster(mode, feature, contacts, i);
+    let share = faster(feature, contacts, i);
     let Some(((key, old), share)) = key.and_then(|key| Some((key, mode.nodes.number(node, key)?))).zip(share) else {
         return Some(diagnostic.help("use a faster filter, or smaller gains"));
     };
@@ -260,10 +278,9 @@ fn slow_filter(mode: &ModeLaw<'_>, feature: &Feature, contacts: &[Contact], slow
 }
 
 /// Returns the part of the delay of a filter with which the loop is good over all contacts.
-fn faster(mode: &ModeLaw<'_>, feature: &Feature, contacts: &[Contact], i: usize) -> Option<f64> {
-    let period = mode.nodes.period();
+fn faster(feature: &Feature, contacts: &[Contact], i: usize) -> Option<f64> {
     let is_good = |feature: &Feature| {
-        let mut loops = contacts.iter().filter_map(|contact| Loop::over(feature, contact, period));
+        let mut loops = contacts.iter().filter_map(|contact| Loop::over(feature, contact));
         loops.all(|around| judge_loop(feature, &around).is_good())
     };
     let shares = std::iter::successors(Some(0.8), |share| Some(share * 0.8)).take(20);

@@ -44,7 +44,7 @@ const MAX_RESIDUAL_SLIDING: f64 = 0.2;
 
 /// Measures how a feature answers each component that moves it.
 pub(super) fn identify(experiment: &Experiment<'_>, object: &str, shell: &Shell) -> Result<Identified, Stop> {
-    let Experiment { feature, period, .. } = *experiment;
+    let Experiment { feature, .. } = *experiment;
     let mut found = Identified {
         object: object.to_owned(),
         fits: Vec::new(),
@@ -58,7 +58,7 @@ pub(super) fn identify(experiment: &Experiment<'_>, object: &str, shell: &Shell)
         let is_lost = response.as_ref().err().is_some_and(|refusal| refusal.is_lost);
         let fitted = response
             .map_err(|refusal| refusal.why)
-            .and_then(|response| Ok((fitted(feature, component, period, &response)?, response)));
+            .and_then(|response| Ok((fitted(feature, component, &response)?, response)));
         match fitted {
             Ok((fit, Response { lines, growth })) => {
                 found.fits.push((COMPONENTS[component], fit));
@@ -78,9 +78,9 @@ pub(super) fn identify(experiment: &Experiment<'_>, object: &str, shell: &Shell)
 ///
 /// # Errors
 /// If noise or friction leave it unknown.
-fn fitted(feature: &Feature, component: usize, period: f64, response: &Response) -> Result<Fit, String> {
+fn fitted(feature: &Feature, component: usize, response: &Response) -> Result<Fit, String> {
     let quantity = quantity(feature);
-    let fit = fit(&response.lines, known(feature, component, period)).map_err(|few| {
+    let fit = fit(&response.lines, known(feature, component)).map_err(|few| {
         let all = response.lines.len();
         format!("only {few} of {all} frequencies stand out of the noise, and a fit needs {ENOUGH}")
     })?;
@@ -108,8 +108,8 @@ fn sticks(quantity: &str, component: usize, fit: &Fit) -> bool {
 }
 
 /// Returns the response of what the graph states, at half of the gains and for one component alone.
-pub(super) fn known(feature: &Feature, component: usize, period: f64) -> impl Fn(f64) -> Complex<f64> {
-    let around = Loop::new(feature, &Answer::default(), 0.0, period).times(HALF);
+pub(super) fn known(feature: &Feature, component: usize) -> impl Fn(f64) -> Complex<f64> {
+    let around = Loop::new(feature, &Answer::default(), 0.0).times(HALF);
     let column = feature.column[component];
     move |omega| around.known(omega) * column
 }

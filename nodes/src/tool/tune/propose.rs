@@ -106,28 +106,22 @@ impl Measurement<'_> {
             Ok(found)
         });
         let found = found.collect::<Result<Vec<Identified>, Stop>>()?;
-        Ok((propose(feature.clone(), found, &contacts, self.wanted, period), contacts))
+        Ok((propose(feature.clone(), found, &contacts, self.wanted), contacts))
     }
 }
 
 /// Returns the largest gains of a feature that keep the margins over all contacts.
-fn propose(
-    feature: Feature,
-    answers: Vec<Identified>,
-    contacts: &[Contact],
-    wanted: Wanted,
-    period: f64,
-) -> TunedFeature {
+fn propose(feature: Feature, answers: Vec<Identified>, contacts: &[Contact], wanted: Wanted) -> TunedFeature {
     let old = [feature.kp, feature.ki, feature.kd];
     let is_measured = answers.iter().all(|found| found.refused.is_none());
     let loops = contacts.iter().enumerate();
     let loops: Vec<(usize, Loop)> =
-        loops.filter_map(|(i, contact)| Some((i, Loop::over(&feature, contact, period)?))).collect();
+        loops.filter_map(|(i, contact)| Some((i, Loop::over(&feature, contact)?))).collect();
     // A fit smooths what friction does near the crossover, so the margins must hold for the measured response too.
     let measured = |(i, around): &(usize, Loop)| match (&answers[*i].fits[..], &answers[*i].lines[..]) {
         ([(component, fit)], [lines]) => {
             let component = COMPONENTS.iter().position(|name| name == component)?;
-            Some(around.measured(fit.missed(lines, known(&feature, component, period))))
+            Some(around.measured(fit.missed(lines, known(&feature, component))))
         }
         _ => None,
     };

@@ -233,6 +233,7 @@ impl Builder<'_> {
             node: built.node,
             inputs,
             ports,
+            sample_s: self.sample_periods.of(Producer::Node(index)),
             is_every_tick: spec.every_tick,
             is_logged: spec.logs,
             holds: spec.limits.holds,

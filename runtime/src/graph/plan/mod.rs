@@ -79,6 +79,8 @@ pub(crate) struct PlannedNode {
     pub(crate) fails: Option<usize>,
     /// The innermost task around it.
     pub(crate) task: usize,
+    /// Nominal time between two samples behind its outputs [s].
+    pub(crate) sample_s: f64,
     /// Whether its limits are in raw readings.
     pub(crate) is_uncalibrated: bool,
     /// Span of its name.

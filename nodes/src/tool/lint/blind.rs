@@ -1,0 +1,20 @@
+//! A search for a contact that the blind limit stops before its mode fails.
+
+use tactflow_runtime::source::{Code, Diagnostic};
+
+use super::arm::Arm;
+use super::mode_law::ModeLaw;
+
+/// Returns the warning about a mode that waits for a contact and fails after a longer way than the blind limit allows.
+pub(super) fn check(arm: &Arm<'_>, mode: &ModeLaw<'_>) -> Option<Diagnostic> {
+    let limiter = arm.limits.iter().find(|limiter| limiter.kind == "blind_limit")?;
+    let most = mode.nodes.number(mode.nodes.node(&limiter.node)?, "blind_mm")?;
+    let way = mode.fails().filter(|_| mode.waits_for_contact()).find_map(|exit| exit.entry("after_travel_mm"))?;
+    let long = way.read::<f64>().filter(|way| *way > most)?;
+    let message = format!(
+        "mode `{}` fails after {long} mm, but the limit `blind_mm` is {most}: the sensor stops there, and waits",
+        mode.own_name()
+    );
+    let help = format!("write a way below {most} mm, or raise `blind_mm` in [limits]");
+    Some(Diagnostic::new(Code::UnreachableSetpoint, way.span.clone(), message).help(help))
+}
