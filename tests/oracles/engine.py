@@ -99,7 +99,9 @@ class Scene:
             return self.radius - np.sqrt(x * x + y * y + (z - self.radius) ** 2)
         if self.kind == "pen":
             beyond = np.maximum(0.0, np.abs(along) - self.half[0])
-            return self.radius - np.sqrt(beyond**2 + across**2 + (z - self.radius) ** 2)
+            # Below its middle the pad does not leave it on the other side.
+            above, below = np.minimum(z - self.radius, 0.0), np.maximum(z - self.radius, 0.0)
+            return self.radius + below - np.sqrt(beyond**2 + across**2 + above**2)
         if self.kind == "edge":
             return (z - np.abs(across)) * TILTED
         # A box with edges of 2 mm.
