@@ -70,19 +70,19 @@ const EVENTS: [Event; 18] = [
     Event {
         task: "force",
         scene: "--scene ball --stiffness 120 --move 6 0 0 0.03 --move 7 0 0 -0.03 --speed 0.075 --change 6 7.4",
-        holds: &[("/lost", 400.0), ("/after/response/pressure", 1.2), ("/most", 12.0)],
+        holds: &[("/lost", 400.0), ("/after/response/pressure", 0.6), ("/most", 6.5)],
     },
     Event {
         task: "position",
         scene: "--scene pen --radius 0.005 --size 0.05 0.05 --move 6 0 0 0.03 --move 7 0 0 -0.03 --speed 0.075 \
                 --change 6 7.4",
-        holds: &[("/lost", 420.0), ("/after/response/x", 1.2), ("/after/response/y", 1.5), ("/most", 14.0)],
+        holds: &[("/lost", 420.0), ("/after/response/x", 0.7), ("/after/response/y", 1.0), ("/most", 7.0)],
     },
     Event {
         task: "hybrid",
         scene: "--scene pen --radius 0.005 --size 0.05 0.05 --move 6 0 0 0.03 --move 7 0 0 -0.03 --speed 0.075 \
                 --change 6 7.4",
-        holds: &[("/lost", 460.0), ("/after/response/pressure", 1.6), ("/most", 14.0)],
+        holds: &[("/lost", 440.0), ("/after/response/pressure", 1.1), ("/most", 8.0)],
     },
     // It moves sideways by 20 mm in 40 ms.
     Event {

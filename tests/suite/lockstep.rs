@@ -151,7 +151,7 @@ const ON_THE_GANTRY: [(&str, &str, f64, Promise); 9] = [
     ("hybrid", "--scene ball --offset 0.006 -0.004", 3.2, CENTRED),
     ("rolling", "--scene ball --radius 0.05 --offset 0.006 -0.004", 3.2, CENTRED),
     ("edge", "--scene edge --angle 1.2", 4.0, ([ANYWHERE; 2], 0.06, 0.0)),
-    ("cable", "--scene rod --radius 0.004 --angle 1.3 --offset 0.003 0", 4.0, ([1e-3, ANYWHERE], 0.03, 0.015)),
+    ("cable", "--scene rod --radius 0.004 --angle 1.3 --offset 0.003 0", 4.8, ([1e-3, ANYWHERE], 0.03, 0.015)),
     ("explore", "--scene plane", 4.8, CENTRED),
     ("square", "--scene plane", 4.8, ([ANYWHERE; 2], ANYWHERE, 0.002)),
     (

@@ -24,7 +24,7 @@ const SMALL_PAD: &str = "rows = 8\ncols = 8\npitch = 0.003\nrate_hz = 100\n";
 /// The shipped tasks: the modes on the way to the work, a time by which each is there [s], and the place of the pressure
 /// among the errors of a task that controls it in newtons.
 const TASKS: [(&str, &[&str], f64, Option<usize>); 12] = [
-    ("cable", &["approach", "servo"], 2.6, Some(2)),
+    ("cable", &["approach", "press", "servo"], 4.0, Some(2)),
     ("edge", &["approach", "servo"], 3.2, Some(0)),
     ("explore", &["approach", "align", "scan"], 4.0, Some(2)),
     ("finger_press", &["none"], 2.0, None),

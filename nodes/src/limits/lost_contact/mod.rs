@@ -24,7 +24,7 @@ pub use course::{Course, Phase, Times};
 /// 1. The arm gives back its lead, the way by which a compliant arm has pressed ahead of its position. It moves out along
 ///    -z at `retreat_m_per_s`, so that the spring does not push the sensor to where the object was. A stiff arm has no lead.
 /// 2. It rests until `wait_ms` after the first tick without the contact, or after the last tick in which anything touched
-///    the pad since. From 3 s after the loss on, a touch that flickers no longer begins the rest anew.
+///    the pad since. An object that is pushed back meanwhile meets a sensor at the place where it left it. From 3 s after the loss on, a touch that flickers no longer begins the rest anew.
 /// 3. It searches: a motion with a part into the object is slowed down as a whole, until no corner of the pad is faster
 ///    than `search_m_per_s`.
 ///
@@ -63,7 +63,7 @@ pub struct Params {
     #[param(unit = "ms", range = 0.001..=1000.0, default = 20.0)]
     debounce_ms: f64,
     /// Time from the first tick without the contact, or from a touch after it, until the arm searches.
-    #[param(unit = "ms", range = 0.0..=60000.0, default = 600.0)]
+    #[param(unit = "ms", range = 0.0..=60000.0, default = 1500.0)]
     wait_ms: f64,
     /// Speed at which the lead is given back.
     #[param(unit = "m/s", above = 0.0, usual = ..=USUAL_M_PER_S, default = 0.02)]

@@ -36,7 +36,8 @@ impl Cell {
             ("position", joints.clone().into()),
             ("equilibrium", joints.into()),
         ];
-        let rig = NodeRig::new::<LostContact>("", &wires).unwrap_or_else(|mistakes| panic!("{mistakes:?}"));
+        let rig =
+            NodeRig::new::<LostContact>("wait_ms = 600", &wires).unwrap_or_else(|mistakes| panic!("{mistakes:?}"));
         Self { rig, wanted: [0.01, 0.0, 0.03, 0.1, 0.0, 0.0], way: 0.0 }
     }
 
