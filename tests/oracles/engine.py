@@ -99,16 +99,16 @@ class Scene:
             return self.radius - np.sqrt(x * x + y * y + (z - self.radius) ** 2)
         if self.kind == "pen":
             beyond = np.maximum(0.0, np.abs(along) - self.half[0])
-            # Below its middle the pad does not leave it on the other side.
-            above, below = np.minimum(z - self.radius, 0.0), np.maximum(z - self.radius, 0.0)
-            return self.radius + below - np.sqrt(beyond**2 + across**2 + above**2)
+            # The pad does not leave it on the other side: below its middle it is as wide as there.
+            side, down = np.hypot(beyond, across), z - self.radius
+            inside = self.radius + np.maximum(down, 0.0) - np.hypot(side, np.minimum(down, 0.0))
+            return np.where(side < self.radius, inside, self.radius - np.hypot(side, down))
         if self.kind == "edge":
             return (z - np.abs(across)) * TILTED
         # A box with edges of 2 mm.
         place = np.abs([along, across, z - self.half[2]]) - (self.half[:, None] - 0.002)
         outside = np.sqrt((np.maximum(place, 0.0) ** 2).sum(axis=0))
         return 0.002 - outside - np.minimum(place.max(axis=0), 0.0)
-
 
     def in_ellipsoid(self, x, y, z):
         """By the first term of the distance, which is exact at the surface."""

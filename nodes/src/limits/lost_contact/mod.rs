@@ -24,7 +24,8 @@ pub use course::{Course, Phase, Times};
 /// 1. The arm gives back its lead, the way by which a compliant arm has pressed ahead of its position. It moves out along
 ///    -z at `retreat_m_per_s`, so that the spring does not push the sensor to where the object was. A stiff arm has no lead.
 /// 2. It rests until `wait_ms` after the first tick without the contact, or after the last tick in which anything touched
-///    the pad since. An object that is pushed back meanwhile meets a sensor at the place where it left it. From 3 s after the loss on, a touch that flickers no longer begins the rest anew.
+///    the pad since. If the object is pushed back during the rest, it meets a sensor that has not moved on. From 3 s
+///    after the loss on, a touch that flickers no longer begins the rest anew.
 /// 3. It searches: a motion with a part into the object is slowed down as a whole, until no corner of the pad is faster
 ///    than `search_m_per_s`.
 ///

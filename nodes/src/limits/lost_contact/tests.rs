@@ -36,6 +36,7 @@ impl Cell {
             ("position", joints.clone().into()),
             ("equilibrium", joints.into()),
         ];
+        // Shorter than the default, so that a case is short.
         let rig =
             NodeRig::new::<LostContact>("wait_ms = 600", &wires).unwrap_or_else(|mistakes| panic!("{mistakes:?}"));
         Self { rig, wanted: [0.01, 0.0, 0.03, 0.1, 0.0, 0.0], way: 0.0 }

@@ -181,7 +181,7 @@ impl Node for Pid {
     fn new(params: Params, setup: &mut Setup<Self>) -> Result<Self, Mistakes> {
         let shape = &setup.inputs.error;
         let gains = params.gains.in_order("gains", shape.names())?;
-        let period = setup.sample_period("error");
+        let period = setup.period;
         let warnings = gains.iter().zip(&shape.features).filter_map(|(gains, feature)| gains.warning(feature, period));
         setup.warnings.extend(warnings);
         let laws =

@@ -41,7 +41,8 @@ use scan::{Moved, Scan};
 /// when the gate is not set for `abandon_after_ms`, or at a speed of 0. Flicker of the gate only pauses it.
 ///
 /// **A lost contact.** A mode that finds the contact again, at any speed but 0, continues the scan within
-/// `abandon_after_ms`. A stroke during which the contact was lost for `reset_after_ms` has ended there.
+/// `abandon_after_ms`. The leg goes on where the contact is found. After a loss of `reset_after_ms`, the time in which it
+/// must make progress begins anew.
 ///
 /// The twist is as old as the gate, so it ends with the contact and when the pad stops sending images. Guidance along a
 /// component that the projector controls leaves an offset of v / kp on the pad.
@@ -156,7 +157,7 @@ pub struct State {
     scan: Option<Scan>,
     /// Of the contact, until the scan is abandoned.
     absence: Absence,
-    /// Of the contact, until its stroke ends.
+    /// Of the contact, until the time for progress begins anew.
     loss: Absence,
 }
 

@@ -65,7 +65,7 @@ pub(super) struct Leg {
 
 /// Time for which the contact must be behind at an edge, so that one image with another contact is not an edge [ns].
 const EDGE_NS: i64 = 40_000_000;
-/// Smallest fraction of the speed, above that of a sensor that makes no progress [1].
+/// Smallest fraction of the speed [1].
 const MIN_PACE: f64 = 0.25;
 /// Number of the leg that is the first stroke.
 const FIRST_STROKE: usize = 2;
@@ -102,7 +102,7 @@ impl Scan {
         let is_edge = self.is_edge(contact.is_some_and(|at| at[leg.side] * leg.sign() < -params.edge_m), tick);
         let way = (at - leg.from) * leg.sign();
         let is_steep = self.is_steep(params, leg, way, tilt);
-        let is_stuck = self.stall.is_stuck(way, params.speed_m_per_s, tick);
+        let is_stuck = self.stall.is_stuck(way, params.speed_m_per_s * self.pace(params, contact), tick);
         if !is_at_end && !is_edge && !is_steep && !is_stuck {
             return;
         }

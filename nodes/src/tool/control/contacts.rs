@@ -9,7 +9,7 @@ use serde::{Deserialize, Serialize};
 pub(crate) struct Contact {
     /// Name of the object, for messages.
     pub(crate) object: String,
-    /// Time from a command to the image that shows its effect, without the period of the graph and without filters
+    /// Time from a command to the image that shows its effect, without the period of the samples and without filters
     /// [ms].
     #[serde(default)]
     pub(crate) latency_ms: f64,

@@ -227,7 +227,10 @@ pub(super) fn feature<'a>(nodes: &Nodes<'a>, jacobian: &'a OutlinedBlock, name: 
     let error = behind.and_then(|node| before(node, "error", "feature_error"));
     let setpoint = error.and_then(|error| setpoint(nodes, &error.name, &name));
     let port = error.and_then(|error| source(error, &name));
-    let period_s = port.map_or(nodes.period(), |port| nodes.sample_period(port));
+    // A role that measures the feature itself has no node; the slowest feature beside it decides then.
+    let period_s = error
+        .zip(port)
+        .map_or(nodes.period(), |(error, port)| nodes.writer(port).map_or(error.sample_s, |node| node.sample_s));
     let way = port.map(|port| way(nodes, port));
     let measured = way.as_ref().map(|way| way.measured.clone());
     let (filters, gates) = way.map(|way| (way.filters, way.gates)).unwrap_or_default();

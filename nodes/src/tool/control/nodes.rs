@@ -119,11 +119,6 @@ impl<'a> Nodes<'a> {
         self.index.outline.period_s
     }
 
-    /// Returns the nominal time between two samples of a port [s].
-    pub(crate) fn sample_period(&self, port: &str) -> f64 {
-        self.writer(port).map_or(self.period(), |node| node.sample_s)
-    }
-
     /// Returns the values of a node in this mode: those of its block, and over them those that the mode sets.
     pub(crate) fn values(&self, node: &'a OutlinedBlock) -> impl Iterator<Item = (&'a str, &'a Setting)> {
         let name = self.mode.and_then(|mode| mode.name.rsplit_once('.')).map_or("", |(task, _)| task);

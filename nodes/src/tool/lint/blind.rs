@@ -9,8 +9,13 @@ use super::mode_law::ModeLaw;
 pub(super) fn check(arm: &Arm<'_>, mode: &ModeLaw<'_>) -> Option<Diagnostic> {
     let limiter = arm.limits.iter().find(|limiter| limiter.kind == "blind_limit")?;
     let most = mode.nodes.number(mode.nodes.node(&limiter.node)?, "blind_mm")?;
-    let way = mode.fails().filter(|_| mode.waits_for_contact()).find_map(|exit| exit.entry("after_travel_mm"))?;
-    let long = way.read::<f64>().filter(|way| *way > most)?;
+    let ways = mode.fails().filter_map(|exit| exit.entry("after_travel_mm"));
+    let ways = ways.filter_map(|way| Some((way.read::<f64>()?, way)));
+    // The shortest one ends the mode.
+    let (long, way) = ways.min_by(|(one, _), (other, _)| one.total_cmp(other))?;
+    if long <= most || !mode.waits_for_contact() {
+        return None;
+    }
     let message = format!(
         "mode `{}` fails after {long} mm, but the limit `blind_mm` is {most}: the sensor stops there, and waits",
         mode.own_name()

@@ -76,7 +76,8 @@ pub(super) fn check(arm: &Arm<'_>) -> Diagnostics {
     // Most modes have the same loops.
     let mut seen = BTreeSet::new();
     for mode in &arm.modes {
-        for feature in mode.moving().filter(|feature| feature.kp > 0.0 && feature.kp * feature.period_s < DIVERGES) {
+        let period = mode.nodes.period();
+        for feature in mode.moving().filter(|feature| feature.kp > 0.0 && feature.kp * period < DIVERGES) {
             let is_judged = is_known(mode, feature, contacts) && is_largest(feature, contacts);
             if is_judged && seen.insert(key(feature)) {
                 found.extend(judge(mode, feature, contacts));
