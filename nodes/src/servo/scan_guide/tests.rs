@@ -249,7 +249,7 @@ fn flicker_pauses_the_scan_and_a_scan_that_is_abandoned_begins_anew() {
         (12, "", true),
         (40, "", false),
         (4000, "abandon_after_ms = 5000", true),
-        (5000, "abandon_after_ms = 5000", false),
+        (6000, "abandon_after_ms = 5000", false),
     ] {
         let mut scene = ScanScene::new(&format!("{SCAN}\n{patience}"));
         while scene.rig.get::<f64>("progress").is_none_or(|progress| *progress < 0.4) {
