@@ -181,8 +181,8 @@ impl Node for Pid {
     fn new(params: Params, setup: &mut Setup<Self>) -> Result<Self, Mistakes> {
         let shape = &setup.inputs.error;
         let gains = params.gains.in_order("gains", shape.names())?;
-        let period = setup.period;
-        let warnings = gains.iter().zip(&shape.features).filter_map(|(gains, feature)| gains.warning(feature, period));
+        let warnings =
+            gains.iter().zip(&shape.features).filter_map(|(gains, feature)| gains.warning(feature, setup.period));
         setup.warnings.extend(warnings);
         let laws =
             gains.into_iter().zip(&shape.features).map(|(gains, feature)| Law::new(gains, feature.unit)).collect();

@@ -28,9 +28,9 @@ use scan::{Moved, Scan};
 /// in the middle stops it at an edge. The scan then continues with the next leg. A step across that moves less than
 /// half of its width is the end of the surface, and of the scan.
 ///
-/// **Pace.** The guide waits for the contact: while it is behind the middle of the pad, the sensor moves more slowly, at
-/// half of `edge_m` with half the speed, and with a quarter of it at least. So the controllers that roll and slide the
-/// sensor keep up where the surface curves much. This needs `in.x` and `in.y`.
+/// **Pace.** The guide waits for the contact. While the contact is behind the middle of the pad, the sensor moves more
+/// slowly: with half the speed if it is behind by half of `edge_m`, and with a quarter of the speed at least. So the
+/// controllers that roll and slide the sensor keep up where the surface curves much. This needs `in.x` and `in.y`.
 ///
 /// **A cap.** With `max_tilt_rad`, a leg along the strokes also ends where the sensor is inclined by more than this to
 /// where the scan began. So strokes are as long as the surface is flat enough: `stroke_m` and `strokes` are then upper
@@ -155,10 +155,8 @@ pub struct Outputs {
 pub struct State {
     /// The scan in progress.
     scan: Option<Scan>,
-    /// Of the contact, until the scan is abandoned.
+    /// Of the contact.
     absence: Absence,
-    /// Of the contact, until the time for progress begins anew.
-    loss: Absence,
 }
 
 impl Node for ScanGuide {
@@ -176,7 +174,7 @@ impl Node for ScanGuide {
         let Params { speed_m_per_s: speed, axis, .. } = self.params;
         let patience = self.params.abandon_after_ms.map_or(tick.reset_after, |time| (time * 1e6) as i64);
         let is_over = state.absence.is_longer(patience, *inputs.gate, tick);
-        if state.loss.is_long(*inputs.gate, tick)
+        if state.absence.is_long(*inputs.gate, tick)
             && let Some(scan) = &mut state.scan
         {
             scan.contact_is_lost();

@@ -269,6 +269,26 @@ fn flicker_pauses_the_scan_and_a_scan_that_is_abandoned_begins_anew() {
 }
 
 #[test]
+fn a_sensor_that_follows_a_slow_guide_is_not_stuck() {
+    // The guide moves with a quarter of the speed, and the sensor with half of that.
+    let mut scene = ScanScene::new(SCAN);
+    let mut way = 0.0;
+    for _ in 0..750 {
+        for (name, place) in [("x", 0.0), ("y", 0.016)] {
+            scene.rig.set(name, place);
+        }
+        scene.rig.set("gate", true);
+        scene.rig.set("pose", Pose(scene.pose));
+        scene.rig.step_ms(4.0);
+        let step = 0.5 * 0.004 * scene.rig.get::<Twist>("twist").unwrap().linear();
+        assert!(step.y < 0.0 && step.x == 0.0, "the first leg goes on after {way} m: {step}");
+        way -= step.y;
+        scene.pose *= IsometryMatrix3::from_parts(step.into(), Rotation3::identity());
+    }
+    assert!((way - 0.0075).abs() < 1e-9, "{way}");
+}
+
+#[test]
 fn the_guide_waits_for_a_contact_that_is_behind() {
     // The first leg moves along -y, and the contact is behind on the side of +y.
     for (y, pace) in [(-0.01, 1.0), (0.0, 1.0), (0.005, 0.75), (0.01, 0.5), (0.019, 0.25)] {

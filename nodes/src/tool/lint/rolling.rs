@@ -43,8 +43,8 @@ fn roller(mode: &ModeLaw<'_>) -> Option<(String, usize, Range<usize>)> {
     let has_contact = || mode.exits("on_lost").next().is_some();
     // A generated motion, such as a sine, or a motion over a surface.
     let generated = || {
-        let rolls = |guide: &&Guidance| rolls_along(guide) || is_composed(guide);
-        mode.law.guidance.iter().filter(rolls).filter(|_| has_contact()).find_map(|guide| {
+        let is_roller = |guide: &&Guidance| (rolls_along(guide) || is_composed(guide)) && has_contact();
+        mode.law.guidance.iter().filter(is_roller).find_map(|guide| {
             let i = [3, 4].into_iter().find(|i| guide.passes[*i])?;
             Some((guide.node().to_owned(), i, mode.nodes.node(guide.node())?.span.clone()))
         })
