@@ -3,6 +3,7 @@
 mod amplitudes;
 mod bode;
 mod cases;
+mod climb;
 mod course;
 mod experiment;
 mod fit;
@@ -13,10 +14,12 @@ mod page;
 mod propose;
 mod ranges;
 mod save;
+mod settled;
 mod signal;
 mod spectrum;
 mod stay;
 mod step;
+mod still;
 mod target;
 mod trial;
 mod tuned;
@@ -31,13 +34,15 @@ use tactflow_runtime::graph::{Outline, Request, compile};
 use super::arguments::{may_draw, write};
 use super::control::chain::chain;
 use super::control::choose::Wanted;
+use super::control::collect::law;
 use super::control::contacts::Contact;
 use super::control::nodes::{Index, Nodes, commands};
 use cases::{Case, cases};
 use propose::Measurement;
 use ranges::Range;
+use settled::{Settled, compare};
 use target::{adder, controlled};
-use trial::{Settled, Trial};
+use trial::Trial;
 use tuned::Tuned;
 
 /// Measure how the features answer the motion, and propose gains with margins
@@ -47,7 +52,9 @@ use tuned::Tuned;
     after_help = "It runs the task and moves the robot. For each feature that the mode controls, it halves the gains, moves the sensor to and
 fro with sines of 0.2 to 8 Hz, one after the other, and moves further and further. This takes 75 s for each of four
 amplitudes. All limits of the graph hold. From the answers it fits a gain, a resonance and a latency, and
-proposes the largest gains that keep the margins over all contacts. Then it runs the task with them, and compares.
+proposes the largest gains that keep the margins over all contacts. Where friction hides the answers, it compares gains
+by steps of the setpoint instead, for 50 s each. Then it runs the task with the old and the new gains, and compares.
+What moves the sensor along the object rests meanwhile.
 
 Examples:
   tactflow tune graphs/force.toml
@@ -163,8 +170,12 @@ fn tune(args: &TuneArgs, shell: &Shell, request: &Request, outline: &Outline) ->
     let command = commands(outline).next().ok_or("no role is an arm, so nothing moves".to_owned())?;
     let index = Index::new(outline);
     let (_, twist) = chain(&Nodes::new(&index, None), command.port)?;
-    let (mode, controlled) = controlled(args, &index, &twist)?;
+    let (mode, controlled) = controlled(args, &index, &twist, command.arm)?;
     let adder = adder(&index, &twist)?;
+    let nodes = Nodes::new(&index, Some(mode));
+    let (resting, still) = still::settings(&nodes, mode, &law(&nodes, &twist));
+    resting.iter().for_each(|node| shell.say_beside(&format!("`{node}` rests meanwhile")));
+    let request = &Request { set: [&request.set[..], &still].concat(), ..request.clone() };
     let wanted = Wanted { peak: args.peak, gain_db: args.gain_margin, phase_deg: args.phase_margin };
     let cases: Vec<Case> = cases(args, request, shell)?;
     let measurement = Measurement { shell, outline, mode, adder: &adder, cases: &cases, wanted };
@@ -180,13 +191,8 @@ fn tune(args: &TuneArgs, shell: &Shell, request: &Request, outline: &Outline) ->
     let (name, ranges, settled) = (mode.name.clone(), Vec::new(), Vec::new());
     let mut tuned = Tuned { mode: name, arm, wanted, contacts, benches, features, ranges, settled };
     for case in &cases {
-        let mut request = case.request.clone();
-        request.set.extend(lift::settings(outline, mode, &adder, signal::measured(outline.period_s)));
-        // With another setting, the mode and its setpoints may be others.
-        let outline = &case.outline;
-        let mode = outline.modes.iter().find(|one| one.name == mode.name).unwrap_or(mode);
-        let trial = Trial { catalogue: shell.catalogue(), request: &request, outline, mode };
-        tuned.settled.extend(trial.compare(&tuned.features, &case.object)?);
+        let trial = Trial::new(shell.catalogue(), case, mode, &adder);
+        tuned.settled.extend(compare(&trial, &tuned.features, &case.object)?);
     }
     Ok(tuned)
 }

@@ -9,8 +9,8 @@ use super::cases::Stated;
 use super::identify::Identified;
 use super::propose::TunedFeature;
 use super::save;
-use super::step::Step;
-use super::trial::Held;
+use super::settled::Held;
+use super::step::{self, Step};
 use super::tuned::Tuned;
 use crate::tool::control::digits::{or_none, to_three_digits};
 
@@ -19,11 +19,15 @@ const ANSWERS: [&str; 7] = ["contact", "motion", "per m or rad", "resonance", "d
 /// Columns of the table of margins.
 const MARGINS: [&str; 6] = ["contact", "crossover", "phase margin", "gain margin", "peak", "bandwidth"];
 
+/// Columns of the table of gains that were compared by steps.
+const CLIMBED: [&str; 5] = ["kp", "error over a step", "overshoot", "error at the end", ""];
+
 pub(super) fn text(tuned: &Tuned) -> String {
     let mut text = String::new();
     for feature in &tuned.features {
         let _ = write!(text, "`{}` in the mode `{}`\n\n", feature.name, tuned.mode);
         text += &answers(&feature.answers);
+        text += &climbed(feature);
         text += &gains(feature);
         text.push('\n');
     }
@@ -63,10 +67,34 @@ fn answers(found: &[Identified]) -> String {
     text
 }
 
+/// The gains that were compared by steps.
+fn climbed(feature: &TunedFeature) -> String {
+    let Some(size) = feature.climbed.iter().flat_map(|rung| rung.steps.iter().flatten()).next().map(|step| step.size)
+    else {
+        return String::new();
+    };
+    let rows = feature.climbed.iter().map(|rung| {
+        let kp = to_three_digits(rung.gains[0]).to_string();
+        let percent = |share: f64| format!("{:.0} %", 100.0 * share);
+        match &rung.failure {
+            Some(why) => [kp, String::new(), String::new(), String::new(), why.clone()],
+            None => [
+                kp,
+                format!("{:.2} s", rung.worst(|step| step.error_s)),
+                percent(rung.worst(|step| step.overshoot)),
+                percent(rung.worst(|step| step.rest)),
+                String::new(),
+            ],
+        }
+    });
+    let rows: Vec<[String; 5]> = [CLIMBED.map(str::to_owned)].into_iter().chain(rows).collect();
+    let size = step::size(&feature.feature, size);
+    format!("So gains are compared by steps of {size}, up and down:\n\n{}", table(&rows, 0, 4))
+}
+
 fn gains(feature: &TunedFeature) -> String {
     let Some([kp, ki, kd]) = feature.new else {
-        let is_measured = feature.answers.iter().all(|found| found.refused.is_none());
-        let why = if is_measured {
+        let why = if feature.is_measured() {
             "No gain keeps the margins: the motion increases the error.\n"
         } else {
             "No gains are proposed.\n"
@@ -74,6 +102,10 @@ fn gains(feature: &TunedFeature) -> String {
         return why.into();
     };
     let [old_kp, old_ki, old_kd] = feature.old;
+    let became = format!("kp {old_kp} becomes {kp}, ki {old_ki} becomes {ki}, kd {old_kd} becomes {kd}");
+    if !feature.climbed.is_empty() {
+        return format!("\n{became}. Its margins are not known.\n");
+    }
     let rows = feature.answers.iter().zip(&feature.margins).map(|(found, margins)| {
         [
             found.object.clone(),
@@ -85,9 +117,7 @@ fn gains(feature: &TunedFeature) -> String {
         ]
     });
     let rows: Vec<[String; 6]> = [MARGINS.map(str::to_owned)].into_iter().chain(rows).collect();
-    let mut text = format!("\nkp {old_kp} becomes {kp}, ki {old_ki} becomes {ki}, kd {old_kd} becomes {kd}:\n");
-    text += &table(&rows, 1, 6);
-    text
+    format!("\n{became}:\n{}", table(&rows, 1, 6))
 }
 
 fn settled(tuned: &Tuned) -> String {
@@ -101,8 +131,9 @@ fn settled(tuned: &Tuned) -> String {
             "Over `{}`, the error of `{}` is {old} with the old gains and {new} with the new ones (rms)",
             one.object, one.feature
         );
-        if let Some((old, new)) = one.old.step.zip(one.new.step) {
-            let (size, old, new) = (to_three_digits(new.size), followed(&old), followed(&new));
+        let feature = tuned.features.iter().find(|feature| feature.name == one.feature);
+        if let Some(((old, new), feature)) = one.old.step.zip(one.new.step).zip(feature) {
+            let (size, old, new) = (step::size(&feature.feature, new.size), followed(&old), followed(&new));
             let _ = write!(text, ". A step of {size} {old} with the old gains, and {new} with the new ones");
         }
         match &one.failure {

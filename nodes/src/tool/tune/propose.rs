@@ -8,12 +8,14 @@ use tactflow_runtime::graph::{Outline, OutlinedMode};
 
 use super::Stop;
 use super::cases::Case;
+use super::climb::{self, Rung};
 use super::experiment::{Experiment, HALF};
 use super::identify::{Identified, answer, identify, known, quantity};
+use super::trial::Trial;
 use crate::motion::COMPONENTS;
 use crate::tool::control::choose::{Wanted, factor};
 use crate::tool::control::contacts::Contact;
-use crate::tool::control::digits::{down_to_two_digits, to_three_digits};
+use crate::tool::control::digits::{down_to_two_digits, to_three_digits, to_two_digits};
 use crate::tool::control::law::Feature;
 use crate::tool::control::margins::{Margins, margins};
 use crate::tool::control::response::Loop;
@@ -28,8 +30,15 @@ pub(super) struct TunedFeature {
     pub(super) old: [f64; 3],
     /// The gains that are proposed, rounded down to two digits; `None` if the margins do not hold with any.
     pub(super) new: Option<[f64; 3]>,
-    /// The margins of the new gains, for each contact.
+    /// The margins of the new gains, for each contact; none if the gains were compared by steps.
     pub(super) margins: Vec<Margins>,
+    /// The gains that were compared by steps, because the response is not known over a contact.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub(super) climbed: Vec<Rung>,
+    /// Largest multiple of the gains of the graph up to which what is known of the loops keeps the margins, such as their
+    /// geometry and filters [1].
+    #[serde(skip)]
+    most: f64,
     #[serde(skip)]
     pub(super) feature: Feature,
     /// The loops with the new gains, or with those of the graph if there are no new ones, each with its contact.
@@ -38,6 +47,18 @@ pub(super) struct TunedFeature {
 }
 
 impl TunedFeature {
+    /// Returns whether its response is known over all contacts.
+    pub(super) fn is_measured(&self) -> bool {
+        self.answers.iter().all(|found| found.refused.is_none())
+    }
+
+    /// Returns the gains of the graph times a factor: `kp` with a few digits, and the others in their ratio to it.
+    fn times(&self, factor: f64, round: impl Fn(f64) -> f64) -> [f64; 3] {
+        let size = self.old[0].abs();
+        let factor = round(size * factor) / size;
+        self.old.map(|gain| to_three_digits(gain * factor))
+    }
+
     /// Returns the proposed gains as a multiple of those of the graph.
     fn factor(&self) -> Option<f64> {
         self.new.map(|new| new[0] / self.old[0])
@@ -73,7 +94,9 @@ impl Measurement<'_> {
         if found.0.answers.iter().any(|found| found.is_lost) {
             // A loop that hardly holds the contact loses it with a test signal.
             say("an eighth of its gains");
-            found = self.measured(feature, contacts, HALF * QUARTER)?;
+            let again = self.measured(feature, contacts, HALF * QUARTER)?;
+            // The first reason is that of the task as it is.
+            found = if again.0.is_measured() { again } else { found };
         }
         // A stiff loop holds the contact against the test signal, and friction then hides more of the motion. A soft one
         // has not settled when the signal begins.
@@ -82,6 +105,27 @@ impl Measurement<'_> {
             let again = self.measured(feature, contacts, QUARTER * factor)?;
             found = if again.0.new.is_some() { again } else { found };
         }
+        if !found.0.is_measured() {
+            found.0 = self.climbed(found.0)?;
+        }
+        Ok(found)
+    }
+
+    /// Compares gains of a feature by steps of its setpoint over all contacts, and proposes the best ones.
+    fn climbed(&self, mut found: TunedFeature) -> Result<TunedFeature, Stop> {
+        while let Some(factor) = climb::next(&found.climbed, found.most) {
+            let gains = found.times(factor, |gain| to_two_digits(gain, libm::round));
+            self.shell.say_beside(&format!("`{}`: steps with kp = {}", found.name, gains[0]));
+            let (mut steps, mut failure) = (Vec::new(), None);
+            for case in self.cases {
+                let trial = Trial::new(self.shell.catalogue(), case, self.mode, self.adder);
+                let Some((followed, why)) = trial.to_and_fro(&found.feature, gains)? else { return Ok(found) };
+                steps.push(followed);
+                failure = failure.or(why);
+            }
+            found.climbed.push(Rung::new(factor, gains, steps, failure));
+        }
+        found.new = climb::best(&found.climbed).map(|rung| rung.gains);
         Ok(found)
     }
 
@@ -113,7 +157,6 @@ impl Measurement<'_> {
 /// Returns the largest gains of a feature that keep the margins over all contacts.
 fn propose(feature: Feature, answers: Vec<Identified>, contacts: &[Contact], wanted: Wanted) -> TunedFeature {
     let old = [feature.kp, feature.ki, feature.kd];
-    let is_measured = answers.iter().all(|found| found.refused.is_none());
     let loops = contacts.iter().enumerate();
     let loops: Vec<(usize, Loop)> =
         loops.filter_map(|(i, contact)| Some((i, Loop::over(&feature, contact)?))).collect();
@@ -126,13 +169,17 @@ fn propose(feature: Feature, answers: Vec<Identified>, contacts: &[Contact], wan
         _ => None,
     };
     let each: Vec<Loop> = loops.iter().filter_map(measured).chain(loops.iter().map(|(_, one)| one.clone())).collect();
-    let factor = factor(&each, wanted).filter(|_| is_measured && loops.len() == contacts.len());
+    let known = factor(&each, wanted);
+    let factor = known.filter(|_| loops.len() == contacts.len());
+    let (name, climbed) = (feature.name.clone(), Vec::new());
+    let (new, margins, most) =
+        (None, Vec::new(), if each.is_empty() { f64::INFINITY } else { known.unwrap_or_default() });
+    let mut found = TunedFeature { name, answers, old, new, margins, climbed, most, feature, loops: Vec::new() };
     // Rounded down, so that the margins hold.
-    let size = feature.kp.abs();
-    let factor = factor.map(|factor| down_to_two_digits(size * factor) / size);
-    let new = factor.map(|factor| old.map(|gain| to_three_digits(gain * factor)));
-    let loops: Vec<(usize, Loop)> =
-        loops.into_iter().map(|(i, around)| (i, around.times(factor.unwrap_or(1.0)))).collect();
-    let margins = new.map(|_| loops.iter().map(|(_, around)| margins(around)).collect()).unwrap_or_default();
-    TunedFeature { name: feature.name.clone(), answers, old, new, margins, feature, loops }
+    found.new = factor.filter(|_| found.is_measured()).map(|factor| found.times(factor, down_to_two_digits));
+    let factor = found.factor().unwrap_or(1.0);
+    found.loops = loops.into_iter().map(|(i, around)| (i, around.times(factor))).collect();
+    let each = found.loops.iter().map(|(_, around)| self::margins(around));
+    found.margins = if found.new.is_some() { each.collect() } else { Vec::new() };
+    found
 }

@@ -4,8 +4,8 @@ use serde::Serialize;
 use tactflow_runtime::graph::{Outline, OutlinedMode};
 
 use super::lift;
-use super::propose::TunedFeature;
-use crate::tool::control::law::setpoint;
+use crate::tool::control::digits::to_three_digits;
+use crate::tool::control::law::{Feature, setpoint};
 use crate::tool::control::nodes::{Index, Nodes, mode_flag, toml};
 
 /// How long a task holds its setpoints before the first step [s].
@@ -14,8 +14,9 @@ const BEFORE_S: f64 = 12.0;
 const LASTS_S: f64 = 8.0;
 /// Beginning of the names of the modes with a changed setpoint.
 const MODE: &str = "tune_step";
-/// Step of a place [m], and of an angle [rad]; that of another feature as a share of its setpoint [1].
-const PLACE: f64 = 2e-3;
+/// Step of a place [m], which is more than most contacts stick, and of an angle [rad]; that of another feature as a share
+/// of its setpoint [1].
+const PLACE: f64 = 5e-3;
 const ANGLE: f64 = 0.05;
 const SHARE: f64 = 0.2;
 /// Time over which the response is averaged [s], so that noise makes no overshoot.
@@ -44,22 +45,33 @@ pub(super) struct Step {
     pub(super) overshoot: f64,
     /// Root mean square of the error at the end, as a share of the step [1].
     pub(super) rest: f64,
+    /// Integral of the absolute error, as a share of the step [s]. A loop without delay has 1 / (kp g).
+    pub(super) error_s: f64,
 }
 
 impl Step {
-    /// Returns what a response says: the errors [unit of the feature] after a step of a size, one in each period [s], and
-    /// those before it. `None` if the feature was absent for a while, or if it was not held before the step.
-    pub(super) fn of(size: f64, before: &[f64], errors: &[f64], period: f64) -> Option<Self> {
+    /// Returns what a response says, beside the mean error before it: see [`Self::of`]. `None` if the feature was absent
+    /// for a while, or if it was not held before the step.
+    pub(super) fn after_rest(size: f64, before: &[f64], errors: &[f64], period: f64) -> Option<Self> {
+        let count = before.len() as f64;
+        let square = before.iter().map(|error| error * error).sum::<f64>() / count;
+        let is_held = square.is_finite() && square.sqrt() <= MAX_ERROR * size.abs();
+        is_held.then_some(())?;
+        let offset = before.iter().sum::<f64>() / count;
+        let errors: Vec<f64> = errors.iter().map(|error| error - offset).collect();
+        Self::of(size, &errors, period)
+    }
+
+    /// Returns what a response says: the errors [unit of the feature] after a step of a size, one in each period [s]. `None`
+    /// if the feature was absent for a while.
+    pub(super) fn of(size: f64, errors: &[f64], period: f64) -> Option<Self> {
         let window = ((MEAN_S / period).round() as usize).max(1);
-        let is_absent = before.iter().chain(errors).any(|error| !error.is_finite());
-        let rest_before = before.iter().map(|error| error * error).sum::<f64>() / before.len() as f64;
-        if is_absent || before.is_empty() || errors.len() < 2 * window || rest_before.sqrt() > MAX_ERROR * size {
+        if errors.iter().any(|error| !error.is_finite()) || errors.len() < 2 * window {
             return None;
         }
-        let offset = before.iter().sum::<f64>() / before.len() as f64;
-        let mean = |part: &[f64]| 1.0 - (part.iter().sum::<f64>() / part.len() as f64 - offset) / size;
+        let mean = |part: &[f64]| 1.0 - part.iter().sum::<f64>() / part.len() as f64 / size;
         let followed: Vec<f64> = errors.windows(window).map(mean).collect();
-        let end = &followed[(followed.len() as f64 * (1.0 - REST)) as usize..];
+        let end = end(&followed);
         let square = end.iter().map(|share| (1.0 - share) * (1.0 - share)).sum::<f64>();
         let most = followed.iter().copied().reduce(f64::max)?;
         let rise = followed.iter().position(|share| *share >= FOLLOWED);
@@ -68,6 +80,7 @@ impl Step {
             rise_s: rise.map(|i| (i + window - 1) as f64 * period),
             overshoot: (most - 1.0).max(0.0),
             rest: (square / end.len() as f64).sqrt(),
+            error_s: followed.iter().map(|share| (1.0 - share).abs()).sum::<f64>() * period,
         })
     }
 
@@ -94,15 +107,15 @@ pub(super) struct Planned {
 }
 
 /// Returns the step of each feature; `None` if its setpoint is not known, or if a node reads the flag of the mode.
-pub(super) fn plan(outline: &Outline, mode: &OutlinedMode, features: &[&TunedFeature]) -> Vec<Option<Planned>> {
+pub(super) fn plan(outline: &Outline, mode: &OutlinedMode, features: &[&Feature]) -> Vec<Option<Planned>> {
     let flag = mode_flag(&mode.name);
     let reads_mode = outline.nodes.iter().flat_map(|node| &node.wires).any(|wire| wire.source == flag);
     let index = Index::new(outline);
     let nodes = Nodes::new(&index, Some(mode));
-    let one = |one: &&TunedFeature| {
-        let compared = one.feature.compared.as_deref().filter(|_| !reads_mode)?;
-        let setpoint = setpoint(&nodes, compared, &one.feature.name)?;
-        let size = match one.feature.quantity()? {
+    let one = |feature: &&Feature| {
+        let compared = feature.compared.as_deref().filter(|_| !reads_mode)?;
+        let setpoint = setpoint(&nodes, compared, &feature.name)?;
+        let size = match feature.quantity()? {
             "x" | "y" => PLACE,
             "orientation" | "angle" => ANGLE,
             _ => SHARE * setpoint.abs(),
@@ -110,6 +123,28 @@ pub(super) fn plan(outline: &Outline, mode: &OutlinedMode, features: &[&TunedFea
         (size > 0.0).then_some(Planned { setpoint, size })
     };
     features.iter().map(one).collect()
+}
+
+/// Returns the size of a step of a feature with its unit, where the unit is known.
+pub(super) fn size(feature: &Feature, size: f64) -> String {
+    let size = to_three_digits(size.abs());
+    match feature.quantity() {
+        Some("x" | "y") => format!("{size} m"),
+        Some("orientation" | "angle") => format!("{size} rad"),
+        _ => size.to_string(),
+    }
+}
+
+/// Returns steps of one feature: up, back, down, and back.
+pub(super) fn to_and_fro(step: Planned) -> [Planned; 4] {
+    let Planned { setpoint, size } = step;
+    let from = |setpoint: f64, size: f64| Planned { setpoint, size };
+    [from(setpoint, size), from(setpoint + size, -size), from(setpoint, -size), from(setpoint - size, size)]
+}
+
+/// Returns the part of the rows before a step that says how the feature was held: their end.
+pub(super) fn end<R>(rows: &[R]) -> &[R] {
+    &rows[(rows.len() as f64 * (1.0 - REST)) as usize..]
 }
 
 /// Returns the name of the mode in which a feature has another setpoint.
@@ -123,19 +158,23 @@ pub(super) fn modes(mode: &OutlinedMode, steps: &[Option<Planned>]) -> Vec<Strin
     [mode.name.clone()].into_iter().chain(steps).chain([lift::MODE.to_owned()]).collect()
 }
 
-/// Returns the settings that let a mode go on through a step of each feature to the lift.
-pub(super) fn settings(mode: &OutlinedMode, features: &[&TunedFeature], steps: &[Option<Planned>]) -> Vec<String> {
+/// Returns the settings that let a mode go on through a step of each feature to the lift. What has stepped stays there, so
+/// that nothing else moves with the next step.
+pub(super) fn settings(mode: &OutlinedMode, features: &[&Feature], steps: &[Option<Planned>]) -> Vec<String> {
     let order = modes(mode, steps);
     let mut set = vec![lift::go(mode, &order[1], BEFORE_S)];
-    let planned = features.iter().zip(steps).filter_map(|(one, step)| Some((&one.feature, (*step)?)));
+    let planned = features.iter().zip(steps).filter_map(|(one, step)| Some((one, (*step)?)));
+    let mut stepped = Vec::new();
     for ((feature, step), names) in planned.zip(order[1..].windows(2)) {
         let [name, next] = [&names[0], &names[1]];
         let kept = mode.settings.iter().filter(|setting| setting.path != "go" && setting.path != "done");
         set.extend(kept.map(|setting| format!("modes.{name}.{}={}", setting.path, toml(setting))));
         set.push(format!("modes.{name}.go=[{}]", lift::after(next, LASTS_S)));
         let node = feature.compared.as_deref().unwrap_or_default();
-        let setpoint = step.setpoint + step.size;
-        set.push(format!("modes.{name}.set.{node}.setpoint.{}={setpoint:?}", feature.name));
+        let key = format!("{node}.setpoint.{}", feature.name);
+        stepped.retain(|(other, _)| *other != key);
+        stepped.push((key, step.setpoint + step.size));
+        set.extend(stepped.iter().map(|(key, setpoint)| format!("modes.{name}.set.{key}={setpoint:?}")));
     }
     set
 }
@@ -162,9 +201,11 @@ mod tests {
     fn a_step_has_the_overshoot_of_its_damping() {
         for damping in [0.3_f64, 0.5, 0.9] {
             let errors: Vec<f64> = errors(damping).iter().map(|error| error + 0.01).collect();
-            let step = Step::of(2.0, &HELD, &errors, 0.004).unwrap();
+            let step = Step::after_rest(2.0, &HELD, &errors, 0.004).unwrap();
             let overshoot = (-std::f64::consts::PI * damping / (1.0 - damping * damping).sqrt()).exp();
             assert!((step.overshoot - overshoot).abs() < 0.02, "{damping}: {step:?}, {overshoot}");
+            // It goes beyond the setpoint for long if it is damped little, which counts too.
+            assert!(damping < 0.9 || (step.error_s - 2.0 * damping / 6.0).abs() < 0.03, "{damping}: {step:?}");
             assert!(step.rest < 0.01 && step.rise_s.unwrap() < 0.8, "{step:?}");
             assert_eq!(step.failure(&Step { overshoot: 0.0, rest: 0.0, ..step }), None, "{step:?}");
         }
@@ -172,9 +213,9 @@ mod tests {
 
     #[test]
     fn a_swing_and_a_step_that_is_not_followed_are_failures_unless_the_old_gains_have_them_too() {
-        let good = Step::of(2.0, &HELD, &errors(0.7), 0.004).unwrap();
+        let good = Step::after_rest(2.0, &HELD, &errors(0.7), 0.004).unwrap();
         for (errors, why) in [(errors(0.0), "overshoots by"), (vec![2.0; 2000], "the error is 100 %")] {
-            let step = Step::of(2.0, &HELD, &errors, 0.004).unwrap();
+            let step = Step::after_rest(2.0, &HELD, &errors, 0.004).unwrap();
             let failure = step.failure(&good).unwrap();
             assert!(failure.contains(why), "{failure}");
             assert_eq!(step.failure(&step), None);
@@ -185,7 +226,11 @@ mod tests {
     fn what_is_absent_or_not_held_says_nothing() {
         let gap: Vec<f64> =
             errors(0.7).into_iter().enumerate().map(|(i, e)| if i == 900 { f64::NAN } else { e }).collect();
-        assert_eq!(Step::of(2.0, &HELD, &gap, 0.004), None);
-        assert_eq!(Step::of(2.0, &[0.5; 500], &errors(0.7), 0.004), None, "a fourth of the step was missing before");
+        assert_eq!(Step::after_rest(2.0, &HELD, &gap, 0.004), None);
+        assert_eq!(
+            Step::after_rest(2.0, &[0.5; 500], &errors(0.7), 0.004),
+            None,
+            "a fourth of the step was missing before"
+        );
     }
 }

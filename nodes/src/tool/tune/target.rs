@@ -1,6 +1,6 @@
 //! What is tuned: the features of one mode, and the node that takes the test signal.
 
-use tactflow_runtime::graph::OutlinedMode;
+use tactflow_runtime::graph::{Outline, OutlinedBlock, OutlinedMode};
 
 use super::TuneArgs;
 use crate::tool::control::collect::law;
@@ -13,10 +13,11 @@ pub(super) fn controlled<'o>(
     args: &TuneArgs,
     index: &Index<'o>,
     twist: &str,
+    arm: &str,
 ) -> Result<(&'o OutlinedMode, Vec<Feature>), String> {
     let task = index.task_of(twist);
     if !task.is_empty() {
-        return Err(format!("the arm follows the part `{task}`: tune the file of this part alone, on the same bench"));
+        return Err(part(index.outline(), task, arm));
     }
     let moving = |mode: &OutlinedMode| {
         let law = law(&Nodes::new(index, Some(mode)), twist);
@@ -45,6 +46,17 @@ pub(super) fn controlled<'o>(
     }
     features.iter().try_for_each(has_a_known_schedule)?;
     Ok((*mode, features))
+}
+
+/// Returns what to tune instead of a part that moves an arm.
+fn part(outline: &Outline, task: &str, arm: &str) -> String {
+    let own = |node: &&OutlinedBlock| node.name.rsplit_once('.').is_some_and(|(part, _)| part == task);
+    let file = outline.nodes.iter().find(own).map_or("", |node| &node.place.file);
+    let device = outline.roles.iter().find(|role| role.name == arm).map_or("", |role| &role.device.text);
+    format!(
+        "the arm follows the part `{task}`: tune its file `{file}` on the same bench, with --set bind.ROLE={device} for each \
+         of its roles and with the limits of this graph. A file with [inputs] works in its graph only, and cannot be tuned"
+    )
 }
 
 /// Refuses a feature whose gains are multiplied by what nothing says.

@@ -1,103 +1,65 @@
-//! The task with the old and with the new gains: how it holds its setpoints, and how it follows steps of them.
+//! A run of the task through steps of its setpoints, with some gains.
 
-use serde::Serialize;
 use tactflow_runtime::catalogue::Catalogue;
 use tactflow_runtime::engine::{End, Engine, RunOptions, run};
 use tactflow_runtime::graph::{Outline, OutlinedMode, Request, compile};
 use tactflow_runtime::node::ScalarId;
 use tactflow_runtime::record::PortColumns;
 
+use super::cases::Case;
 use super::course::Course;
-use super::propose::TunedFeature;
 use super::step::{self, Planned, Step};
-use super::{Stop, gain_keys, signal};
+use super::{Stop, gain_keys, lift, signal};
+use crate::tool::control::law::Feature;
 
-/// How a task holds a feature.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub(super) struct Settled {
-    pub(super) object: String,
-    pub(super) feature: String,
-    /// With the old gains.
-    pub(super) old: Held,
-    /// With the new gains.
-    pub(super) new: Held,
-    /// Why the run with the new gains is no success.
-    pub(super) failure: Option<String>,
-}
-
-/// How a feature is held with some gains.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub(super) struct Held {
-    /// Root mean square of the error before the step.
-    pub(super) error: Option<f64>,
-    pub(super) step: Option<Step>,
-}
-
-/// Largest error, as a multiple of that with the old gains, where no step says more [1].
-const WORSE: f64 = 1.5;
-
-impl Held {
-    /// Returns what is wrong with it, if it is worse than with the old gains.
-    fn failure(&self, old: &Self) -> Option<String> {
-        if let Some((new, old)) = self.step.zip(old.step) {
-            return new.failure(&old);
-        }
-        let growth = self.error.zip(old.error).map(|(new, old)| new / old).filter(|growth| *growth > WORSE);
-        let grows = growth.map(|growth| format!("the error grows to {growth:.1} times what it was"));
-        let is_lost = old.step.is_some() || old.error.is_some() && self.error.is_none();
-        grows.or_else(|| is_lost.then(|| "it is not held, or absent for a while".to_owned()))
-    }
-}
-
-impl Settled {
-    pub(super) const fn is_good(&self) -> bool {
-        self.failure.is_none()
-    }
-}
+/// The steps of a feature, as far as they are known, and why the run has failed.
+type Followed = (Vec<Option<Step>>, Option<String>);
 
 /// What a task does with its features.
 pub(super) struct Trial<'a> {
-    pub(super) catalogue: &'a Catalogue,
+    catalogue: &'a Catalogue,
     /// Lets the sensor lift off at the end.
-    pub(super) request: &'a Request,
+    request: Request,
     pub(super) outline: &'a Outline,
     pub(super) mode: &'a OutlinedMode,
 }
 
-impl Trial<'_> {
-    /// Runs the task with both gains, and compares how it holds each feature that has new ones.
-    pub(super) fn compare(&self, features: &[TunedFeature], object: &str) -> Result<Vec<Settled>, Stop> {
-        let changed: Vec<&TunedFeature> = features.iter().filter(|one| one.new.is_some()).collect();
-        if changed.is_empty() {
-            return Ok(Vec::new());
-        }
-        let gains = |one: &&TunedFeature| gain_keys::gains(&one.feature, self.mode, one.new.unwrap_or(one.old));
-        let new: Vec<String> = changed.iter().flat_map(gains).collect();
-        let steps = step::plan(self.outline, self.mode, &changed);
-        let [(old, _), (new, failure)] = [self.hold(&changed, &steps, &[])?, self.hold(&changed, &steps, &new)?];
-        let each = changed.iter().zip(old.into_iter().zip(new));
-        Ok(each
-            .map(|(one, (old, new))| {
-                let failure = failure.clone().or_else(|| new.failure(&old));
-                Settled { object: object.to_owned(), feature: one.name.clone(), old, new, failure }
-            })
-            .collect())
+impl<'a> Trial<'a> {
+    /// A trial of a case, in a mode whose motions the node `adder` adds.
+    pub(super) fn new(catalogue: &'a Catalogue, case: &'a Case, mode: &'a OutlinedMode, adder: &str) -> Self {
+        // With another setting, the mode and its setpoints may be others.
+        let outline = &case.outline;
+        let mode = outline.modes.iter().find(|one| one.name == mode.name).unwrap_or(mode);
+        let mut request = case.request.clone();
+        request.set.extend(lift::settings(outline, mode, adder, signal::measured(outline.period_s)));
+        Self { catalogue, request, outline, mode }
     }
 
-    /// Returns how the task holds each feature with some gains, and why the run has failed.
-    fn hold(
+    /// Returns how a feature follows steps up and down with some gains, and why the run has failed; `None` if its setpoint
+    /// has no steps.
+    pub(super) fn to_and_fro(&self, feature: &Feature, gains: [f64; 3]) -> Result<Option<Followed>, Stop> {
+        let Some(step) = step::plan(self.outline, self.mode, &[feature])[0] else { return Ok(None) };
+        let steps = step::to_and_fro(step);
+        let gains = gain_keys::gains(feature, self.mode, gains);
+        let (seen, failure) = self.follow(&[feature; 4], &steps.map(Some), &gains)?;
+        let each = seen.iter().zip(steps).map(|(seen, step)| Step::of(step.size, &seen.after, self.outline.period_s));
+        Ok(Some((each.collect(), failure)))
+    }
+
+    /// Runs the task with some gains through steps of its features. Returns what each feature did, and why the run has failed.
+    pub(super) fn follow(
         &self,
-        features: &[&TunedFeature],
+        features: &[&Feature],
         steps: &[Option<Planned>],
         gains: &[String],
-    ) -> Result<(Vec<Held>, Option<String>), Stop> {
+    ) -> Result<(Vec<Seen>, Option<String>), Stop> {
         let set = [&self.request.set[..], gains, &step::settings(self.mode, features, steps)].concat();
         let request = Request { set, ..self.request.clone() };
         let compiled = compile(self.catalogue, &request).map_err(|report| report.render(false))?;
         let period = compiled.outline().period_s;
         let mut engine = Engine::new(compiled);
-        let ports = features.iter().map(|one| {
-            let port = one.feature.error_port().unwrap_or_else(|| format!(".error.{}", one.feature.name));
+        let ports = features.iter().map(|feature| {
+            let port = feature.error_port().unwrap_or_else(|| format!(".error.{}", feature.name));
             PortColumns::find(engine.ports(), &port).ok_or_else(|| Stop::Refused(format!("no port is `{port}`")))
         });
         let ports: Vec<ScalarId> = ports.collect::<Result<_, _>>()?;
@@ -114,20 +76,27 @@ impl Trial<'_> {
             (End::Fault(fault), _) => Some(fault.to_string()),
             (_, failure) => failure,
         };
-        let held = (0..features.len()).map(|i| {
+        let seen = (0..features.len()).map(|i| {
             let column = |rows: &[Vec<f64>]| rows.iter().map(|row| row[i]).collect::<Vec<f64>>();
-            let before = column(course.rows(&self.mode.name).get(settling..).unwrap_or_default());
-            let after = column(course.rows(&step::mode_name(i)));
-            let step = steps[i].and_then(|step| Step::of(step.size, &before, &after, period));
-            Held { error: deviation(before.into_iter()), step }
+            let held = column(course.rows(&self.mode.name).get(settling..).unwrap_or_default());
+            let earlier = (0..i).rev().find(|earlier| steps[*earlier].is_some());
+            let before = earlier.map(|earlier| column(step::end(course.rows(&step::mode_name(earlier)))));
+            Seen {
+                before: before.unwrap_or_else(|| held.clone()),
+                held,
+                after: column(course.rows(&step::mode_name(i))),
+            }
         });
-        Ok((held.collect(), failure))
+        Ok((seen.collect(), failure))
     }
 }
 
-/// Returns the root mean square of what is finite.
-fn deviation(values: impl Iterator<Item = f64>) -> Option<f64> {
-    let values: Vec<f64> = values.filter(|value| value.is_finite()).collect();
-    let square: f64 = values.iter().map(|value| value * value).sum();
-    (!values.is_empty()).then(|| (square / values.len() as f64).sqrt())
+/// The errors of a feature in one run.
+pub(super) struct Seen {
+    /// In the mode itself.
+    pub(super) held: Vec<f64>,
+    /// Before its step.
+    pub(super) before: Vec<f64>,
+    /// After its step.
+    pub(super) after: Vec<f64>,
 }

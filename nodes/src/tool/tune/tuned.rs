@@ -5,7 +5,7 @@ use serde::Serialize;
 use super::cases::Stated;
 use super::propose::TunedFeature;
 use super::ranges::Range;
-use super::trial::Settled;
+use super::settled::Settled;
 use crate::tool::control::choose::Wanted;
 use crate::tool::control::contacts::Contact;
 

@@ -1,0 +1,160 @@
+//! Gains that grow from run to run, compared by steps: for a feature whose response is not known.
+
+use serde::Serialize;
+
+use super::step::Step;
+
+/// Share of the gains of the graph with which it begins [1].
+const FIRST: f64 = 0.5;
+/// Ratio of the gains of two runs: 2 dB [1].
+const RATIO: f64 = 1.26;
+/// Smallest and largest multiple of the gains of the graph [1].
+const RANGE: [f64; 2] = [0.1, 16.0];
+/// Error over the steps, as a multiple of the smallest one, from which on gains are worse [1].
+const WORSE: f64 = 1.1;
+/// Number of larger gains after which the error must be smaller, because each step meets another friction.
+const PATIENCE: usize = 2;
+/// Error over the steps, as a multiple of the smallest one before, from which on it is no smaller [1].
+const SMALLER: f64 = 0.95;
+/// Number of gains that may fail one after the other, from the first ones on.
+const FAILURES: usize = 4;
+/// Largest overshoot, in the mean over the steps [1]. A peak of the sensitivity of 1.7 has one of about 0.4.
+const MAX_OVERSHOOT: f64 = 0.4;
+
+/// Largest error at the end of the steps of gains that are good, as a share of a step [1]. Noise alone has more where a
+/// step is small.
+const MAX_REST: f64 = 0.2;
+
+/// How a feature follows steps with some gains.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub(super) struct Rung {
+    /// The gains as a multiple of those of the graph.
+    #[serde(skip)]
+    pub(super) factor: f64,
+    pub(super) gains: [f64; 3],
+    /// The steps over all contacts, those of one contact together.
+    pub(super) steps: Vec<Vec<Step>>,
+    /// Why no larger gains are tried, such as a mode that was left.
+    pub(super) failure: Option<String>,
+}
+
+impl Rung {
+    /// Returns the runs with some gains. They fail if the feature is absent, or if it overshoots.
+    pub(super) fn new(factor: f64, gains: [f64; 3], steps: Vec<Vec<Option<Step>>>, failure: Option<String>) -> Self {
+        let is_known = steps.iter().flatten().all(Option::is_some);
+        let steps = steps.into_iter().map(|contact| contact.into_iter().flatten().collect()).collect();
+        let mut rung = Self { factor, gains, steps, failure };
+        let overshoot = rung.worst(|step| step.overshoot);
+        if rung.failure.is_none() && !is_known {
+            rung.failure = Some("it is absent for a while".to_owned());
+        } else if rung.failure.is_none() && overshoot > MAX_OVERSHOOT {
+            rung.failure = Some("it overshoots".to_owned());
+        }
+        rung
+    }
+
+    /// Returns a number of the steps, as the mean over those of the worst contact.
+    pub(super) fn worst(&self, of: impl Fn(&Step) -> f64) -> f64 {
+        let mean = |steps: &Vec<Step>| steps.iter().map(&of).sum::<f64>() / steps.len().max(1) as f64;
+        self.steps.iter().map(mean).fold(0.0, f64::max)
+    }
+
+    /// Returns the error over the steps [s]; `None` if the gains are not good: they fail, or the feature does not settle, so
+    /// that larger gains may be better.
+    fn error_s(&self) -> Option<f64> {
+        let is_good = self.failure.is_none() && self.worst(|step| step.rest) <= MAX_REST;
+        is_good.then(|| self.worst(|step| step.error_s))
+    }
+}
+
+/// Returns the gains to try next, as a multiple of those of the graph; `None` after enough of them.
+///
+/// They grow until they bring no more, until they fail, or up to the largest multiple `most`. They become smaller while the
+/// smallest ones are as good as the best, or if the first ones fail. `climbed` are those that were tried, in this order.
+pub(super) fn next(climbed: &[Rung], most: f64) -> Option<f64> {
+    let mut sorted: Vec<&Rung> = climbed.iter().collect();
+    sorted.sort_by(|a, b| a.factor.total_cmp(&b.factor));
+    let ([lowest, ..], Some(highest)) = (&sorted[..], sorted.last()) else {
+        return (most >= RANGE[0]).then_some(FIRST.min(most));
+    };
+    let least = |rungs: &[&Rung]| rungs.iter().filter_map(|rung| rung.error_s()).reduce(f64::min);
+    let best = least(&sorted);
+    let before = least(&sorted[..sorted.len().saturating_sub(PATIENCE)]);
+    let grows = before.zip(best).is_none_or(|(before, best)| best < SMALLER * before);
+    let larger = highest.factor * RATIO;
+    if highest.failure.is_none() && grows && larger <= most.min(RANGE[1]) {
+        return Some(larger);
+    }
+    let smaller = lowest.factor / RATIO;
+    let may_be_smaller = match lowest.error_s().zip(best) {
+        Some((error, best)) => error <= WORSE * best,
+        None => lowest.failure.is_some() && climbed.len() < FAILURES,
+    };
+    (may_be_smaller && smaller >= RANGE[0]).then_some(smaller)
+}
+
+/// Returns the best gains: the smallest ones with which the error over the steps is as small as with any, but for a tenth.
+pub(super) fn best(climbed: &[Rung]) -> Option<&Rung> {
+    let least = climbed.iter().filter_map(Rung::error_s).reduce(f64::min)?;
+    let good = climbed.iter().filter(|rung| rung.error_s().is_some_and(|error| error <= WORSE * least));
+    good.min_by(|a, b| a.factor.total_cmp(&b.factor))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Climbs where the error over the steps, or that the gains fail, follows from the factor. Returns the factors in their
+    /// order, and the best one.
+    fn climb(most: f64, error: impl Fn(f64) -> Option<f64>) -> (Vec<f64>, Option<f64>) {
+        let mut climbed = Vec::new();
+        while let Some(factor) = next(&climbed, most) {
+            assert!(climbed.len() < 30, "it goes on for ever: {climbed:?}");
+            let step = |error_s| Step { size: 1.0, rise_s: None, overshoot: 0.1, rest: 0.0, error_s };
+            let steps = vec![vec![error(factor).map(step); 4]];
+            climbed.push(Rung::new(factor, [factor, 0.0, 0.0], steps, None));
+        }
+        let factors = climbed.iter().map(|rung| rung.factor).collect();
+        (factors, best(&climbed).map(|rung| rung.factor))
+    }
+
+    #[test]
+    fn the_best_gains_are_found_from_below_and_from_above() {
+        for least in [0.3, 1.0, 4.0] {
+            let (tried, best) = climb(RANGE[1], |factor| Some(1.0 + (factor / least).ln().abs()));
+            let best = best.unwrap();
+            assert!((best / least).ln().abs() < 0.24, "{least}: {best}, of {tried:?}");
+            assert!(tried.iter().all(|factor| *factor < 2.1 * least.max(0.5)), "{least}: {tried:?}");
+        }
+    }
+
+    #[test]
+    fn gains_that_fail_are_the_end_of_the_climb() {
+        let (tried, best) = climb(RANGE[1], |factor| (factor < 0.9).then_some(1.0 / factor));
+        assert!(tried.iter().filter(|factor| **factor >= 0.9).count() == 1, "{tried:?}");
+        assert!((0.7..0.9).contains(&best.unwrap()), "{best:?}");
+        let (tried, best) = climb(RANGE[1], |factor| (factor < 0.3).then_some(1.0 / factor));
+        assert!(tried.windows(2).all(|pair| pair[1] < pair[0]), "{tried:?}");
+        assert!((0.2..0.3).contains(&best.unwrap()), "{best:?}");
+        let (tried, best) = climb(RANGE[1], |_| None);
+        assert_eq!((tried.len(), best), (FAILURES, None));
+    }
+
+    #[test]
+    fn gains_beyond_the_margins_are_not_tried() {
+        assert_eq!(climb(0.0, |_| Some(1.0)), (Vec::new(), None), "a motion the wrong way");
+        for most in [0.3, 1.0, 1.4] {
+            let (tried, best) = climb(most, |factor| Some(1.0 / factor));
+            assert!(tried.iter().all(|factor| *factor <= most), "{most}: {tried:?}");
+            assert!(best.unwrap() > 0.7 * most, "{most}: {best:?}");
+        }
+    }
+
+    #[test]
+    fn one_run_that_is_worse_by_chance_does_not_end_it_and_a_plateau_does() {
+        let dip = |factor: f64| (0.6..0.7).contains(&factor);
+        let (tried, best) = climb(RANGE[1], |factor| Some(if dip(factor) { 9.0 } else { 1.0 / factor.min(2.0) }));
+        assert!(best.unwrap() > 1.6, "{best:?}");
+        assert!(tried.iter().all(|factor| *factor < 4.0), "{tried:?}");
+    }
+}
