@@ -161,3 +161,16 @@ fn the_numbers_of_a_warning_are_those_of_explain() {
     let run = crate::tool::say(&[&["run"], &args[..], &["--for", "10ms", "--quiet"]].concat());
     assert!(run.err.contains("warning[low-margin]"), "{}", run.err);
 }
+
+#[test]
+fn a_schedule_that_makes_the_gains_larger_is_named_where_its_bound_stands() {
+    let factors = ["--set", "nodes.stiffness.nominal=150", "--set", "nodes.schedule.max=10"];
+    let pen = ["check", "graphs/force.toml", "--bench", "graphs/benches/pen.toml"];
+    let checked = crate::tool::say(&[&pen[..], &factors[..]].concat());
+    let note = "note: `schedule` multiplies the gains by 10.0 over `pen`\n  --> command line:1:20\n";
+    assert!(checked.err.contains("warning[low-margin]") && checked.err.contains(note), "{}", checked.err);
+    // One that makes them smaller is no reason.
+    let gain = ["--set", "nodes.pid.gains.pressure.kp=4", "--set", "nodes.stiffness.nominal=5"];
+    let checked = crate::tool::say(&[&pen[..], &gain[..]].concat());
+    assert!(checked.err.contains("warning[low-margin]") && !checked.err.contains("multiplies"), "{}", checked.err);
+}
