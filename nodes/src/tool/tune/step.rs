@@ -14,9 +14,10 @@ const BEFORE_S: f64 = 12.0;
 const LASTS_S: f64 = 8.0;
 /// Beginning of the names of the modes with a changed setpoint.
 const MODE: &str = "tune_step";
-/// Step of a place [m], which is more than most contacts stick, and of an angle [rad]; that of another feature as a share
-/// of its setpoint [1].
+/// Step of a place [m], which is more than most contacts stick, and its largest share of the pad [1]; that of an angle
+/// [rad]; that of another feature as a share of its setpoint [1].
 const PLACE: f64 = 5e-3;
+const PLACE_SHARE: f64 = 0.1;
 const ANGLE: f64 = 0.05;
 const SHARE: f64 = 0.2;
 /// Time over which the response is averaged [s], so that noise makes no overshoot.
@@ -116,13 +117,20 @@ pub(super) fn plan(outline: &Outline, mode: &OutlinedMode, features: &[&Feature]
         let compared = feature.compared.as_deref().filter(|_| !reads_mode)?;
         let setpoint = setpoint(&nodes, compared, &feature.name)?;
         let size = match feature.quantity()? {
-            "x" | "y" => PLACE,
+            "x" | "y" => extent(&nodes, feature).map_or(PLACE, |extent| PLACE.min(PLACE_SHARE * extent)),
             "orientation" | "angle" => ANGLE,
             _ => SHARE * setpoint.abs(),
         };
         (size > 0.0).then_some(Planned { setpoint, size })
     };
     features.iter().map(one).collect()
+}
+
+/// Returns how far the values of a place reach over the pad [m], if its node states their range.
+fn extent(nodes: &Nodes<'_>, feature: &Feature) -> Option<f64> {
+    let port = feature.measured.as_ref()?;
+    let [least, most] = nodes.writer(port)?.outputs.iter().find(|output| output.name == *port)?.range?;
+    Some(most - least)
 }
 
 /// Returns the size of a step of a feature with its unit, where the unit is known.
@@ -181,7 +189,10 @@ pub(super) fn settings(mode: &OutlinedMode, features: &[&Feature], steps: &[Opti
 
 #[cfg(test)]
 mod tests {
+    use tactflow_runtime::graph::{Request, compile};
+
     use super::*;
+    use crate::tool::control::collect::law;
 
     /// The errors after a step of 2 of a second-order system with a damping ratio, for 8 s.
     fn errors(damping: f64) -> Vec<f64> {
@@ -232,5 +243,28 @@ mod tests {
             None,
             "a fourth of the step was missing before"
         );
+    }
+
+    /// Returns the steps of the features of `hybrid` on a pad of this pitch.
+    fn planned(pitch: &str) -> Vec<f64> {
+        let path = format!("{}/../graphs/hybrid.toml", env!("CARGO_MANIFEST_DIR"));
+        let request = Request { set: vec![format!("devices.bench.pitch={pitch}")], ..Request::file(path) };
+        let compiled =
+            compile(&crate::catalogue(), &request).unwrap_or_else(|report| panic!("{}", report.render(false)));
+        let index = Index::new(compiled.outline());
+        let mode = compiled.outline().modes.iter().find(|mode| mode.name == "servo").unwrap();
+        let law = law(&Nodes::new(&index, Some(mode)), "sum.twist");
+        let features: Vec<&Feature> = law.features.iter().collect();
+        let steps = plan(compiled.outline(), mode, &features);
+        steps.into_iter().map(|step| step.unwrap().size).collect()
+    }
+
+    #[test]
+    fn a_step_stays_on_a_small_pad() {
+        let near = |sizes: &[f64], expected: [f64; 3]| sizes.iter().zip(expected).all(|(a, b)| (a - b).abs() < 1e-9);
+        let [large, small] = ["0.005", "0.001"].map(planned);
+        assert!(near(&large, [5e-3, 5e-3, 0.02]), "{large:?}");
+        // Its tactels reach from -7.5 to 7.5 mm.
+        assert!(near(&small, [1.5e-3, 1.5e-3, 0.02]), "{small:?}");
     }
 }
