@@ -5,6 +5,7 @@ use tactflow_runtime::cli::Shell;
 use super::Stop;
 use super::experiment::{Answered, Experiment};
 use super::fit::ENOUGH;
+use super::limited::Limited;
 use super::spectrum::Line;
 
 /// Amplitudes of a linear [m] and of an angular test signal [rad], one after the other.
@@ -21,6 +22,8 @@ pub(super) struct Response {
     pub(super) lines: Vec<Line>,
     /// The last response as a multiple of the one before, if no two of them agree [1].
     pub(super) growth: Option<f64>,
+    /// The limit that has acted most in the last of these motions, if it has acted much.
+    pub(super) limited: Option<Limited>,
 }
 
 /// Why a response is not known.
@@ -39,13 +42,16 @@ pub(super) fn agreed(
     component: usize,
     shell: &Shell,
 ) -> Result<Result<Response, Refusal>, Stop> {
-    let mut runs: Vec<Vec<Line>> = Vec::new();
+    let (mut runs, mut limited): (Vec<Vec<Line>>, Vec<Option<Limited>>) = (Vec::new(), Vec::new());
     let mut stopped = None;
     let unit = if component < 3 { "m" } else { "rad" };
     for amplitude in AMPLITUDES[component / 3] {
         shell.say_beside(&format!("`{}`: a test signal of {amplitude} {unit}", experiment.feature.name));
         match experiment.run(component, amplitude)? {
-            Answered::Lines(lines) => runs.push(lines),
+            Answered::Lines(lines, limit) => {
+                runs.push(lines);
+                limited.push(limit);
+            }
             Answered::Nothing(reason) => {
                 stopped = Some(format!("with a test signal of {amplitude} {unit}, {reason}"));
                 break;
@@ -56,13 +62,13 @@ pub(super) fn agreed(
     let agree = (1..runs.len()).rev().find(|i| difference(&runs[i - 1], &runs[*i]) < AGREES);
     let is_loudest = |i: usize| !runs[i + 1..].iter().any(|later| loudness(&runs[i], later) > 1.0 + AGREES);
     if let Some(i) = agree.filter(|i| is_loudest(*i)) {
-        return Ok(Ok(Response { lines: Line::mean(&runs[..=i]), growth: None }));
+        return Ok(Ok(Response { lines: Line::mean(&runs[..=i]), growth: None, limited: limited[i].take() }));
     }
     if let [.., before, last] = &runs[..] {
         let growth = loudness(before, last);
         if growth <= 1.0 + MAX_CHANGE && difference(before, last) <= MAX_CHANGE {
             let lines = if growth > 1.0 { last } else { before }.clone();
-            return Ok(Ok(Response { lines, growth: Some(growth) }));
+            return Ok(Ok(Response { lines, growth: Some(growth), limited: limited.pop().flatten() }));
         }
     }
     let is_lost = agree.is_none() && stopped.is_some();

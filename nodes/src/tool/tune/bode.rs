@@ -81,7 +81,7 @@ fn block(svg: &mut Svg, feature: &TunedFeature, top: f64) -> f64 {
 /// Returns the name of a contact with its margins.
 fn legend(feature: &TunedFeature, i: usize) -> String {
     let found = &feature.answers[i];
-    match (&found.refused, feature.margins.get(i)) {
+    match (&found.refused, feature.margins[i].as_ref()) {
         (Some(_), _) => format!("{}: not measured", found.object),
         (None, None) => found.object.clone(),
         (None, Some(margins)) => {

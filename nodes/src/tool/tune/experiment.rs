@@ -8,6 +8,7 @@ use tactflow_runtime::source::{Code, Report};
 
 use super::gain_keys::gains;
 use super::lift;
+use super::limited::{Limited, Watch};
 use super::signal::{Sine, duration, measured, settling};
 use super::spectrum::{Line, line};
 use super::stay::Stay;
@@ -41,8 +42,8 @@ pub(super) const HALF: f64 = 0.5;
 /// What one run said.
 #[derive(Debug)]
 pub(super) enum Answered {
-    /// The lines of the spectrum.
-    Lines(Vec<Line>),
+    /// The lines of the spectrum, and the limit that has acted much.
+    Lines(Vec<Line>, Option<Limited>),
     /// Why there are none, such as a mode that was left.
     Nothing(String),
     /// Somebody interrupted it.
@@ -69,12 +70,16 @@ impl Experiment<'_> {
         let all = find(&engine, format!("{}.twist.{}", self.adder, COMPONENTS[component]))?;
         let sines = Sine::all(self.period);
         let wanted = sines.last().map_or(0, Sine::end);
-        let mut stay = Stay::new(self.mode.name.clone(), settling(self.period), wanted);
+        let (mut limits, settled) = (Watch::new(&engine), settling(self.period));
+        let mut stay = Stay::new(self.mode.name.clone(), settled, wanted);
         let options = RunOptions { duration: Some(duration(self.period)), ..RunOptions::default() };
         let column = self.feature.column[component];
         let outcome = run(&mut engine, &options, &mut |engine| {
             let read = |port| engine.bus().scalar(port).unwrap_or(f64::NAN);
             stay.see(engine.mode(), || [read(control) * column, read(all)]);
+            if (settled..wanted).contains(&stay.rows().len()) {
+                limits.see(engine);
+            }
         });
         let outcome = outcome.map_err(|error| format!("the run cannot start: {error}"))?;
         let (rows, left) = (stay.rows(), stay.left());
@@ -89,7 +94,7 @@ impl Experiment<'_> {
             _ if rows[sines[0].begin..].iter().flatten().any(|value| !value.is_finite()) => {
                 Answered::Nothing(format!("`{}` was absent for a while", self.feature.name))
             }
-            _ => Answered::Lines(sines.iter().map(|sine| self.line(rows, sine)).collect()),
+            _ => Answered::Lines(sines.iter().map(|sine| self.line(rows, sine)).collect(), limits.most()),
         })
     }
 

@@ -8,6 +8,7 @@ use super::Stop;
 use super::amplitudes::{Response, agreed};
 use super::experiment::{Experiment, HALF};
 use super::fit::{ENOUGH, Fit, fit};
+use super::limited::Limited;
 use super::spectrum::Line;
 use crate::motion::COMPONENTS;
 use crate::tool::control::contacts::Answer;
@@ -27,6 +28,9 @@ pub(super) struct Identified {
     /// The answer to the largest motion as a multiple of that to the one before, if no two motions agree [1].
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(super) growth: Option<f64>,
+    /// The limit that acted much while it was measured.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(super) limited: Option<Limited>,
     /// Why there is no fit.
     pub(super) refused: Option<String>,
     /// Whether a test signal has ended the mode.
@@ -50,6 +54,7 @@ pub(super) fn identify(experiment: &Experiment<'_>, object: &str, shell: &Shell)
         fits: Vec::new(),
         lines: Vec::new(),
         growth: None,
+        limited: None,
         refused: None,
         is_lost: false,
     };
@@ -60,10 +65,11 @@ pub(super) fn identify(experiment: &Experiment<'_>, object: &str, shell: &Shell)
             .map_err(|refusal| refusal.why)
             .and_then(|response| Ok((fitted(feature, component, &response)?, response)));
         match fitted {
-            Ok((fit, Response { lines, growth })) => {
+            Ok((fit, Response { lines, growth, limited })) => {
                 found.fits.push((COMPONENTS[component], fit));
                 found.lines.push(lines);
                 found.growth = growth.or(found.growth);
+                found.limited = limited.or(found.limited);
             }
             Err(why) => {
                 (found.refused, found.is_lost) = (Some(why), is_lost);

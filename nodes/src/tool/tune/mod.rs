@@ -10,6 +10,7 @@ mod fit;
 mod gain_keys;
 mod identify;
 mod lift;
+mod limited;
 mod page;
 mod propose;
 mod ranges;
@@ -189,7 +190,7 @@ fn tune(args: &TuneArgs, shell: &Shell, request: &Request, outline: &Outline) ->
     let arm = command.arm.to_owned();
     let benches = cases.iter().map(|case| case.stated.clone()).collect();
     let (name, ranges, settled) = (mode.name.clone(), Vec::new(), Vec::new());
-    let mut tuned = Tuned { mode: name, arm, wanted, contacts, benches, features, ranges, settled };
+    let mut tuned = Tuned { mode: name, resting, arm, wanted, contacts, benches, features, ranges, settled };
     for case in &cases {
         let trial = Trial::new(shell.catalogue(), case, mode, &adder);
         tuned.settled.extend(compare(&trial, &tuned.features, &case.object)?);

@@ -6,7 +6,9 @@ use std::path::Path;
 use tactflow_runtime::cli::table;
 
 use super::cases::Stated;
+use super::climb;
 use super::identify::Identified;
+use super::limited::Limited;
 use super::propose::TunedFeature;
 use super::save;
 use super::settled::Held;
@@ -24,6 +26,10 @@ const CLIMBED: [&str; 5] = ["kp", "error over a step", "overshoot", "error at th
 
 pub(super) fn text(tuned: &Tuned) -> String {
     let mut text = String::new();
+    let resting: Vec<String> = tuned.resting.iter().map(|node| format!("`{node}`")).collect();
+    if !resting.is_empty() {
+        let _ = writeln!(text, "Measured and compared while {} rests.\n", resting.join(" and "));
+    }
     for feature in &tuned.features {
         let _ = write!(text, "`{}` in the mode `{}`\n\n", feature.name, tuned.mode);
         text += &answers(&feature.answers);
@@ -61,6 +67,15 @@ fn answers(found: &[Identified]) -> String {
             "Over `{object}`, the largest motion has an answer that is {change:.0} % {how}: {which} counts."
         );
     }
+    for (object, Limited { limit, share }) in found.iter().filter_map(|one| Some((&one.object, one.limited.as_ref()?)))
+    {
+        let share = 100.0 * share;
+        let _ = writeln!(
+            text,
+            "Over `{object}`, `{limit}` reduced the motion in {share:.0} % of the ticks, so that the contact answers more than \
+             measured: raise the limit, or keep smaller gains."
+        );
+    }
     for (object, why) in found.iter().filter_map(|one| Some((&one.object, one.refused.as_ref()?))) {
         let _ = writeln!(text, "Not measured over `{object}`: {why}.");
     }
@@ -69,55 +84,75 @@ fn answers(found: &[Identified]) -> String {
 
 /// The gains that were compared by steps.
 fn climbed(feature: &TunedFeature) -> String {
-    let Some(size) = feature.climbed.iter().flat_map(|rung| rung.steps.iter().flatten()).next().map(|step| step.size)
-    else {
+    if feature.climbed.is_empty() {
         return String::new();
-    };
+    }
+    let percent = |share: f64| format!("{:.0} %", 100.0 * share);
     let rows = feature.climbed.iter().map(|rung| {
-        let kp = to_three_digits(rung.gains[0]).to_string();
-        let percent = |share: f64| format!("{:.0} %", 100.0 * share);
-        match &rung.failure {
-            Some(why) => [kp, String::new(), String::new(), String::new(), why.clone()],
-            None => [
-                kp,
-                format!("{:.2} s", rung.worst(|step| step.error_s)),
-                percent(rung.worst(|step| step.overshoot)),
-                percent(rung.worst(|step| step.rest)),
-                String::new(),
-            ],
-        }
+        let is_whole = rung.steps.iter().all(|steps| !steps.is_empty());
+        let known = |text: String| if is_whole { text } else { String::new() };
+        [
+            to_three_digits(rung.gains[0]).to_string(),
+            known(format!("{:.2} s", rung.worst(|step| step.error_s))),
+            known(percent(rung.worst(|step| step.overshoot))),
+            known(percent(rung.worst(|step| step.rest))),
+            rung.failure.clone().unwrap_or_default(),
+        ]
     });
     let rows: Vec<[String; 5]> = [CLIMBED.map(str::to_owned)].into_iter().chain(rows).collect();
-    let size = step::size(&feature.feature, size);
-    format!("So gains are compared by steps of {size}, up and down:\n\n{}", table(&rows, 0, 4))
+    let steps = feature.climbed.iter().flat_map(|rung| rung.steps.iter().flatten());
+    let size = step::heading(&feature.feature, steps.map(|step| step.size.abs()).next());
+    let worst = if feature.answers.len() > 1 { "; each number is that of the worst contact" } else { "" };
+    let mut text = format!("So gains are compared by steps of {size}, up and down{worst}:\n\n");
+    text += &table(&rows, 0, 4);
+    if climb::is_bounded(&feature.climbed, feature.most) {
+        text += "Larger gains are beyond the margins of what is known of the loop.\n";
+    }
+    text
+}
+
+/// Why no gains are proposed.
+fn why_none(feature: &TunedFeature) -> String {
+    if feature.is_measured() {
+        return "No gain keeps the margins: the motion increases the error.\n".into();
+    }
+    if feature.is_lost() {
+        return "No gains are proposed: start with a gain at which the test signal does not end the mode.\n".into();
+    }
+    let why = match (feature.climbed.is_empty(), feature.most > 0.0) {
+        (true, true) => {
+            "its setpoint cannot step, because it is 0, comes from a node, or because a node reads the flag of the mode"
+        }
+        (true, false) => "the motion increases the error",
+        _ => {
+            "each is near one that fails, or has an error of more than 20 % at the end of the steps; a larger setpoint or \
+             more filtering lets a step stand out of the noise"
+        }
+    };
+    format!("No gains are proposed: {why}.\n")
 }
 
 fn gains(feature: &TunedFeature) -> String {
-    let Some([kp, ki, kd]) = feature.new else {
-        let why = if feature.is_measured() {
-            "No gain keeps the margins: the motion increases the error.\n"
-        } else {
-            "No gains are proposed.\n"
-        };
-        return why.into();
-    };
+    let Some([kp, ki, kd]) = feature.new else { return why_none(feature) };
     let [old_kp, old_ki, old_kd] = feature.old;
-    let became = format!("kp {old_kp} becomes {kp}, ki {old_ki} becomes {ki}, kd {old_kd} becomes {kd}");
-    if !feature.climbed.is_empty() {
-        return format!("\n{became}. Its margins are not known.\n");
-    }
-    let rows = feature.answers.iter().zip(&feature.margins).map(|(found, margins)| {
-        [
+    let rows = feature.answers.iter().zip(&feature.margins).filter_map(|(found, margins)| {
+        let margins = margins.as_ref()?;
+        Some([
             found.object.clone(),
             or_none(margins.crossover_hz, "Hz", 2),
             or_none(margins.phase_deg, "deg", 0),
             or_none(margins.gain_db, "dB", 1),
             format!("{:.2}", margins.peak_sensitivity),
             margins.bandwidth(),
-        ]
+        ])
     });
     let rows: Vec<[String; 6]> = [MARGINS.map(str::to_owned)].into_iter().chain(rows).collect();
-    format!("\n{became}:\n{}", table(&rows, 1, 6))
+    let table = if rows.len() > 1 { table(&rows, 1, 6) } else { String::new() };
+    let mut text = format!("\nkp {old_kp} becomes {kp}, ki {old_ki} becomes {ki}, kd {old_kd} becomes {kd}:\n{table}");
+    for found in feature.answers.iter().filter(|found| found.refused.is_some()) {
+        let _ = writeln!(text, "The margins over `{}` are not known.", found.object);
+    }
+    text
 }
 
 fn settled(tuned: &Tuned) -> String {
@@ -132,6 +167,8 @@ fn settled(tuned: &Tuned) -> String {
             one.object, one.feature
         );
         let feature = tuned.features.iter().find(|feature| feature.name == one.feature);
+        // One step over a contact that sticks is chance: the table has the mean of four.
+        let feature = feature.filter(|feature| feature.climbed.is_empty());
         if let Some(((old, new), feature)) = one.old.step.zip(one.new.step).zip(feature) {
             let (size, old, new) = (step::size(&feature.feature, new.size), followed(&old), followed(&new));
             let _ = write!(text, ". A step of {size} {old} with the old gains, and {new} with the new ones");

@@ -8,9 +8,10 @@ use tactflow_runtime::graph::{Outline, OutlinedMode};
 
 use super::Stop;
 use super::cases::Case;
-use super::climb::{self, Rung};
+use super::climb::{self, Followed, Rung};
 use super::experiment::{Experiment, HALF};
 use super::identify::{Identified, answer, identify, known, quantity};
+use super::step::Planned;
 use super::trial::Trial;
 use crate::motion::COMPONENTS;
 use crate::tool::control::choose::{Wanted, factor};
@@ -30,15 +31,15 @@ pub(super) struct TunedFeature {
     pub(super) old: [f64; 3],
     /// The gains that are proposed, rounded down to two digits; `None` if the margins do not hold with any.
     pub(super) new: Option<[f64; 3]>,
-    /// The margins of the new gains, for each contact; none if the gains were compared by steps.
-    pub(super) margins: Vec<Margins>,
+    /// The margins of the new gains, for each contact over which the response is known.
+    pub(super) margins: Vec<Option<Margins>>,
     /// The gains that were compared by steps, because the response is not known over a contact.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub(super) climbed: Vec<Rung>,
     /// Largest multiple of the gains of the graph up to which what is known of the loops keeps the margins, such as their
     /// geometry and filters [1].
     #[serde(skip)]
-    most: f64,
+    pub(super) most: f64,
     #[serde(skip)]
     pub(super) feature: Feature,
     /// The loops with the new gains, or with those of the graph if there are no new ones, each with its contact.
@@ -52,11 +53,32 @@ impl TunedFeature {
         self.answers.iter().all(|found| found.refused.is_none())
     }
 
+    /// Returns whether a test signal has ended the mode.
+    pub(super) fn is_lost(&self) -> bool {
+        self.answers.iter().any(|found| found.is_lost)
+    }
+
     /// Returns the gains of the graph times a factor: `kp` with a few digits, and the others in their ratio to it.
     fn times(&self, factor: f64, round: impl Fn(f64) -> f64) -> [f64; 3] {
         let size = self.old[0].abs();
         let factor = round(size * factor) / size;
         self.old.map(|gain| to_three_digits(gain * factor))
+    }
+
+    /// Returns gains near a multiple of those of the graph, and no larger ones than the margins allow.
+    fn near(&self, factor: f64) -> [f64; 3] {
+        let gains = self.times(factor, |gain| to_two_digits(gain, libm::round));
+        if gains[0] <= self.most * self.old[0] { gains } else { self.times(factor, down_to_two_digits) }
+    }
+
+    /// Sets the gains that are proposed, with their loops and margins.
+    fn set(&mut self, new: Option<[f64; 3]>) {
+        self.new = new;
+        let factor = self.factor().unwrap_or(1.0);
+        self.loops.iter_mut().for_each(|(_, around)| *around = around.times(factor));
+        let measured = |i: usize| self.new.is_some() && self.answers[i].refused.is_none();
+        let over = |i: usize| self.loops.iter().find(|(contact, _)| *contact == i && measured(i));
+        self.margins = (0..self.answers.len()).map(|i| over(i).map(|(_, around)| margins(around))).collect();
     }
 
     /// Returns the proposed gains as a multiple of those of the graph.
@@ -67,6 +89,8 @@ impl TunedFeature {
 
 /// Proposed gains, as a multiple of those of the graph, with which a loop is not measured again [1].
 const NEAR: RangeInclusive<f64> = 0.83..=3.0;
+/// Shares of the gains of the graph with which a loop is measured again that a test signal drives out of its mode [1].
+const SMALLER: [(f64, &str); 2] = [(0.125, "an eighth of its gains"), (0.25, "a quarter of its gains")];
 /// Share of the proposed gains with which it is measured again [1].
 const QUARTER: f64 = 0.25;
 
@@ -91,10 +115,13 @@ impl Measurement<'_> {
     ) -> Result<(TunedFeature, Vec<Contact>), Stop> {
         let say = |gains: &str| self.shell.say_beside(&format!("`{}`: again, with {gains}", feature.name));
         let mut found = self.measured(feature, contacts, HALF)?;
-        if found.0.answers.iter().any(|found| found.is_lost) {
+        for (share, name) in SMALLER {
+            if !found.0.is_lost() {
+                break;
+            }
             // A loop that hardly holds the contact loses it with a test signal.
-            say("an eighth of its gains");
-            let again = self.measured(feature, contacts, HALF * QUARTER)?;
+            say(name);
+            let again = self.measured(feature, contacts, share)?;
             // The first reason is that of the task as it is.
             found = if again.0.is_measured() { again } else { found };
         }
@@ -105,27 +132,31 @@ impl Measurement<'_> {
             let again = self.measured(feature, contacts, QUARTER * factor)?;
             found = if again.0.new.is_some() { again } else { found };
         }
-        if !found.0.is_measured() {
+        // What a test signal drives out of its mode may be near instability, and steps would not show it.
+        if !found.0.is_measured() && !found.0.is_lost() {
             found.0 = self.climbed(found.0)?;
         }
         Ok(found)
     }
 
-    /// Compares gains of a feature by steps of its setpoint over all contacts, and proposes the best ones.
+    /// Compares gains of a feature by steps of its setpoint over all contacts, and proposes the best ones. A setpoint that
+    /// cannot step gives none.
     fn climbed(&self, mut found: TunedFeature) -> Result<TunedFeature, Stop> {
+        let trial = |case| Trial::new(self.shell.catalogue(), case, self.mode, self.adder);
+        let trials: Vec<Trial<'_>> = self.cases.iter().map(trial).collect();
+        let steps: Option<Vec<[Planned; 4]>> = trials.iter().map(|trial| trial.steps(&found.feature)).collect();
+        let Some(steps) = steps else { return Ok(found) };
         while let Some(factor) = climb::next(&found.climbed, found.most) {
-            let gains = found.times(factor, |gain| to_two_digits(gain, libm::round));
+            let gains = found.near(factor);
             self.shell.say_beside(&format!("`{}`: steps with kp = {}", found.name, gains[0]));
-            let (mut steps, mut failure) = (Vec::new(), None);
-            for case in self.cases {
-                let trial = Trial::new(self.shell.catalogue(), case, self.mode, self.adder);
-                let Some((followed, why)) = trial.to_and_fro(&found.feature, gains)? else { return Ok(found) };
-                steps.push(followed);
-                failure = failure.or(why);
-            }
-            found.climbed.push(Rung::new(factor, gains, steps, failure));
+            let followed = trials.iter().zip(&steps).zip(&found.answers).map(|((trial, steps), answer)| {
+                let (steps, failure) = trial.to_and_fro(&found.feature, steps, gains)?;
+                Ok(Followed { object: answer.object.clone(), steps, failure })
+            });
+            let followed = followed.collect::<Result<Vec<Followed>, Stop>>()?;
+            found.climbed.push(Rung::new(factor, gains, &followed));
         }
-        found.new = climb::best(&found.climbed).map(|rung| rung.gains);
+        found.set(climb::best(&found.climbed).map(|rung| rung.gains));
         Ok(found)
     }
 
@@ -172,14 +203,9 @@ fn propose(feature: Feature, answers: Vec<Identified>, contacts: &[Contact], wan
     let known = factor(&each, wanted);
     let factor = known.filter(|_| loops.len() == contacts.len());
     let (name, climbed) = (feature.name.clone(), Vec::new());
-    let (new, margins, most) =
-        (None, Vec::new(), if each.is_empty() { f64::INFINITY } else { known.unwrap_or_default() });
-    let mut found = TunedFeature { name, answers, old, new, margins, climbed, most, feature, loops: Vec::new() };
+    let most = if each.is_empty() { f64::INFINITY } else { known.unwrap_or_default() };
+    let mut found = TunedFeature { name, answers, old, new: None, margins: Vec::new(), climbed, most, feature, loops };
     // Rounded down, so that the margins hold.
-    found.new = factor.filter(|_| found.is_measured()).map(|factor| found.times(factor, down_to_two_digits));
-    let factor = found.factor().unwrap_or(1.0);
-    found.loops = loops.into_iter().map(|(i, around)| (i, around.times(factor))).collect();
-    let each = found.loops.iter().map(|(_, around)| self::margins(around));
-    found.margins = if found.new.is_some() { each.collect() } else { Vec::new() };
+    found.set(factor.filter(|_| found.is_measured()).map(|factor| found.times(factor, down_to_two_digits)));
     found
 }

@@ -143,6 +143,13 @@ pub(super) fn size(feature: &Feature, size: f64) -> String {
     }
 }
 
+/// Returns the size of the steps of a feature, for a sentence: as a share where its unit is not known.
+pub(super) fn heading(feature: &Feature, size: Option<f64>) -> String {
+    let has_unit = matches!(feature.quantity(), Some("x" | "y" | "orientation" | "angle"));
+    let size = size.filter(|_| has_unit).map(|metres| self::size(feature, metres));
+    size.unwrap_or_else(|| format!("{:.0} % of the setpoint", 100.0 * SHARE))
+}
+
 /// Returns steps of one feature: up, back, down, and back.
 pub(super) fn to_and_fro(step: Planned) -> [Planned; 4] {
     let Planned { setpoint, size } = step;

@@ -52,10 +52,19 @@ pub(super) fn controlled<'o>(
 fn part(outline: &Outline, task: &str, arm: &str) -> String {
     let own = |node: &&OutlinedBlock| node.name.rsplit_once('.').is_some_and(|(part, _)| part == task);
     let file = outline.nodes.iter().find(own).map_or("", |node| &node.place.file);
+    let table = |file: &str| std::fs::read_to_string(file).ok()?.parse::<toml::Table>().ok();
+    let table = table(file).unwrap_or_default();
+    let says = format!("the arm follows the part `{task}`");
+    if table.contains_key("inputs") {
+        return format!("{says}, which has [inputs] and cannot run alone: tune a task that has the same loop");
+    }
     let device = outline.roles.iter().find(|role| role.name == arm).map_or("", |role| &role.device.text);
+    let roles = table.get("roles").and_then(toml::Value::as_table).into_iter().flat_map(toml::Table::keys);
+    let binds: String = roles.map(|role| format!(" --set bind.{role}={device}")).collect();
+    let bench = outline.devices.first().map_or("", |device| &device.place.file);
     format!(
-        "the arm follows the part `{task}`: tune its file `{file}` on the same bench, with --set bind.ROLE={device} for each \
-         of its roles and with the limits of this graph. A file with [inputs] works in its graph only, and cannot be tuned"
+        "{says}: tune its file on the same bench. It has limits of its own; add those of this graph with --set\n\ntactflow \
+         tune {file} --bench {bench}{binds}"
     )
 }
 

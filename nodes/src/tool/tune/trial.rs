@@ -12,9 +12,6 @@ use super::step::{self, Planned, Step};
 use super::{Stop, gain_keys, lift, signal};
 use crate::tool::control::law::Feature;
 
-/// The steps of a feature, as far as they are known, and why the run has failed.
-type Followed = (Vec<Option<Step>>, Option<String>);
-
 /// What a task does with its features.
 pub(super) struct Trial<'a> {
     catalogue: &'a Catalogue,
@@ -35,15 +32,22 @@ impl<'a> Trial<'a> {
         Self { catalogue, request, outline, mode }
     }
 
-    /// Returns how a feature follows steps up and down with some gains, and why the run has failed; `None` if its setpoint
-    /// has no steps.
-    pub(super) fn to_and_fro(&self, feature: &Feature, gains: [f64; 3]) -> Result<Option<Followed>, Stop> {
-        let Some(step) = step::plan(self.outline, self.mode, &[feature])[0] else { return Ok(None) };
-        let steps = step::to_and_fro(step);
+    /// Returns the steps of a feature up and down; `None` if its setpoint has none.
+    pub(super) fn steps(&self, feature: &Feature) -> Option<[Planned; 4]> {
+        step::plan(self.outline, self.mode, &[feature])[0].map(step::to_and_fro)
+    }
+
+    /// Returns how a feature follows steps with some gains, as far as it is known, and why the run has failed.
+    pub(super) fn to_and_fro(
+        &self,
+        feature: &Feature,
+        steps: &[Planned; 4],
+        gains: [f64; 3],
+    ) -> Result<(Vec<Option<Step>>, Option<String>), Stop> {
         let gains = gain_keys::gains(feature, self.mode, gains);
         let (seen, failure) = self.follow(&[feature; 4], &steps.map(Some), &gains)?;
         let each = seen.iter().zip(steps).map(|(seen, step)| Step::of(step.size, &seen.after, self.outline.period_s));
-        Ok(Some((each.collect(), failure)))
+        Ok((each.collect(), failure))
     }
 
     /// Runs the task with some gains through steps of its features. Returns what each feature did, and why the run has failed.

@@ -13,6 +13,9 @@ use crate::tool::control::contacts::Contact;
 #[derive(Debug, Serialize)]
 pub(super) struct Tuned {
     pub(super) mode: String,
+    /// The nodes that rest while it is measured and compared: they would move the sensor along the object.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub(super) resting: Vec<String>,
     /// Name of the role of the arm.
     pub(super) arm: String,
     pub(super) wanted: Wanted,
