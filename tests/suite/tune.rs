@@ -255,6 +255,24 @@ fn a_place_that_sticks_gets_the_same_gain_from_far_below() {
 }
 
 #[test]
+#[ignore = "it takes more than half a minute: `.ci/edge` runs it"]
+fn steps_over_one_contact_keep_the_margins_over_another_one_that_was_measured() {
+    let (_folder, path) = in_new_folder("bode.svg");
+    let both = ["graphs/hybrid.toml", "--feature", "pressure", "--with", "graphs/benches/pen.toml"];
+    let said = say(&[&["tune"], &both[..], &["--svg", &path, "--format", "json"]].concat());
+    assert_eq!(said.code, 0, "{}{}", said.out, said.err);
+    let tuned: Value = serde_json::from_str(&said.out).unwrap();
+    let feature = &tuned["features"][0];
+    let (ball, pen) = (&feature["margins"][0], &feature["margins"][1]);
+    assert!(ball.is_null() && feature["answers"][0]["refused"].is_string(), "{feature}");
+    assert!(pen["gain_db"].as_f64().unwrap() >= 9.0 && pen["peak_sensitivity"].as_f64().unwrap() <= 1.7, "{pen}");
+    // The curve has the proposed gains, as the dots.
+    let drawn = peer("bode.py", &[&path]);
+    let crossover: f64 = drawn.split_whitespace().next().unwrap().parse().unwrap();
+    assert!((crossover / pen["crossover_hz"].as_f64().unwrap() - 1.0).abs() < 0.02, "{drawn}: {pen}");
+}
+
+#[test]
 fn a_task_that_follows_a_cable_is_tuned_while_it_stands() {
     let said = say(&["tune", "graphs/cable.toml", "--feature", "orientation", "--format", "json"]);
     assert_eq!(said.code, 0, "{}{}", said.out, said.err);
