@@ -16,16 +16,15 @@ const WORSE: f64 = 1.1;
 const PATIENCE: usize = 3;
 /// Error over the steps, as a multiple of the smallest one before, from which on it is no smaller [1].
 const SMALLER: f64 = 0.95;
-/// Ratio of gains that fail to those that are proposed, at least: three runs, 6 dB [1].
-const MARGIN: f64 = RATIO * RATIO * RATIO;
+/// Ratio of gains that fail to those that are proposed, at least: three runs, 6 dB, less what rounding takes [1].
+const MARGIN: f64 = 0.99 * RATIO * RATIO * RATIO;
 /// Number of gains that may fail one after the other, from the first ones on.
 const FAILURES: usize = 4;
 /// Largest overshoot, in the mean over the steps [1].
 const MAX_OVERSHOOT: f64 = 0.3;
-
 /// Largest error at the end of the steps of gains that are good, as a share of a step [1]. Noise alone has more where a
 /// step is small.
-const MAX_REST: f64 = 0.2;
+pub(super) const MAX_REST: f64 = 0.2;
 
 /// How a feature follows steps with some gains.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -92,7 +91,8 @@ impl Rung {
 /// Returns the gains to try next, as a multiple of those of the graph; `None` after enough of them.
 ///
 /// They grow until they bring no more, until they fail, or up to the largest multiple `most`. They become smaller while the
-/// smallest ones are as good as the best, or if the first ones and those of the graph fail. `climbed` are those that were tried, in this order.
+/// smallest ones are the best, or if the first ones and those of the graph fail. `climbed` are those that were tried, in
+/// this order.
 pub(super) fn next(climbed: &[Rung], most: f64) -> Option<f64> {
     let mut sorted: Vec<&Rung> = climbed.iter().collect();
     sorted.sort_by(|a, b| a.factor.total_cmp(&b.factor));
@@ -130,7 +130,7 @@ pub(super) fn is_bounded(climbed: &[Rung], most: f64) -> bool {
 pub(super) fn best(climbed: &[Rung]) -> Option<&Rung> {
     let is_far = |rung: &&Rung| {
         let failed = climbed.iter().filter(|other| other.failure.is_some() && other.factor > rung.factor);
-        failed.map(|other| other.factor).fold(f64::INFINITY, f64::min) > 0.99 * MARGIN * rung.factor
+        failed.map(|other| other.factor).fold(f64::INFINITY, f64::min) > MARGIN * rung.factor
     };
     let counted: Vec<&Rung> = climbed.iter().filter(|rung| rung.is_good() && is_far(rung)).collect();
     let least = counted.iter().filter_map(|rung| rung.error_s()).reduce(f64::min)?;

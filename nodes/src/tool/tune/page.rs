@@ -20,7 +20,6 @@ use crate::tool::control::digits::{or_none, to_three_digits};
 const ANSWERS: [&str; 7] = ["contact", "motion", "per m or rad", "resonance", "damping", "latency", "frequencies"];
 /// Columns of the table of margins.
 const MARGINS: [&str; 6] = ["contact", "crossover", "phase margin", "gain margin", "peak", "bandwidth"];
-
 /// Columns of the table of gains that were compared by steps.
 const CLIMBED: [&str; 5] = ["kp", "error over a step", "overshoot", "error at the end", ""];
 
@@ -28,7 +27,8 @@ pub(super) fn text(tuned: &Tuned) -> String {
     let mut text = String::new();
     let resting: Vec<String> = tuned.resting.iter().map(|node| format!("`{node}`")).collect();
     if !resting.is_empty() {
-        let _ = writeln!(text, "Measured and compared while {} rests.\n", resting.join(" and "));
+        let rest = if resting.len() > 1 { "rest" } else { "rests" };
+        let _ = writeln!(text, "Measured and compared while {} {rest}.\n", resting.join(" and "));
     }
     for feature in &tuned.features {
         let _ = write!(text, "`{}` in the mode `{}`\n\n", feature.name, tuned.mode);
@@ -119,15 +119,17 @@ fn why_none(feature: &TunedFeature) -> String {
     if feature.is_lost() {
         return "No gains are proposed: start with a gain at which the test signal does not end the mode.\n".into();
     }
-    let why = match (feature.climbed.is_empty(), feature.most > 0.0) {
-        (true, true) => {
-            "its setpoint cannot step, because it is 0, comes from a node, or because a node reads the flag of the mode"
-        }
-        (true, false) => "the motion increases the error",
-        _ => {
-            "each is near one that fails, or has an error of more than 20 % at the end of the steps; a larger setpoint or \
-             more filtering lets a step stand out of the noise"
-        }
+    let why = if climb::next(&[], feature.most).is_none() {
+        "even a tenth of the gains of the graph is beyond the margins of what is known of the loop".to_owned()
+    } else if feature.climbed.is_empty() {
+        "its setpoint cannot step, because it is 0, comes from a node, or because a node reads the flag of the mode"
+            .into()
+    } else {
+        format!(
+            "each is near one that fails, or has an error of more than {:.0} % at the end of the steps; a larger setpoint or \
+             more filtering lets a step stand out of the noise",
+            100.0 * climb::MAX_REST
+        )
     };
     format!("No gains are proposed: {why}.\n")
 }

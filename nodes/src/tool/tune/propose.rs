@@ -29,7 +29,7 @@ pub(super) struct TunedFeature {
     pub(super) answers: Vec<Identified>,
     /// Proportional, integral and derivative gain of the graph.
     pub(super) old: [f64; 3],
-    /// The gains that are proposed, rounded down to two digits; `None` if the margins do not hold with any.
+    /// The gains that are proposed, with two digits of `kp`; `None` if there are none that hold.
     pub(super) new: Option<[f64; 3]>,
     /// The margins of the new gains, for each contact over which the response is known.
     pub(super) margins: Vec<Option<Margins>>,

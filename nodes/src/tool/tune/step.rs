@@ -146,7 +146,7 @@ pub(super) fn size(feature: &Feature, size: f64) -> String {
 /// Returns the size of the steps of a feature, for a sentence: as a share where its unit is not known.
 pub(super) fn heading(feature: &Feature, size: Option<f64>) -> String {
     let has_unit = matches!(feature.quantity(), Some("x" | "y" | "orientation" | "angle"));
-    let size = size.filter(|_| has_unit).map(|metres| self::size(feature, metres));
+    let size = size.filter(|_| has_unit).map(|size| self::size(feature, size));
     size.unwrap_or_else(|| format!("{:.0} % of the setpoint", 100.0 * SHARE))
 }
 
@@ -157,7 +157,7 @@ pub(super) fn to_and_fro(step: Planned) -> [Planned; 4] {
     [from(setpoint, size), from(setpoint + size, -size), from(setpoint, -size), from(setpoint - size, size)]
 }
 
-/// Returns the part of the rows before a step that says how the feature was held: their end.
+/// Returns the end of the rows of a mode, in which its features must rest.
 pub(super) fn end<R>(rows: &[R]) -> &[R] {
     &rows[(rows.len() as f64 * (1.0 - REST)) as usize..]
 }
