@@ -273,6 +273,22 @@ fn steps_over_one_contact_keep_the_margins_over_another_one_that_was_measured() 
 }
 
 #[test]
+#[ignore = "it takes more than half a minute: `.ci/edge` runs it"]
+fn a_light_press_is_measured_by_small_motions_and_its_gains_keep_the_contact() {
+    let said = say(&["tune", "graphs/guided.toml", "--format", "json"]);
+    let tuned: Value = serde_json::from_str(&said.out).unwrap();
+    let feature = &tuned["features"][0];
+    let answer = &feature["answers"][0];
+    assert_eq!(answer["lifts_off"].as_f64(), Some(4.8e-3), "{answer}");
+    let [kp, gain] = [&feature["new"][0], &answer["fits"][0][1]["gain"]].map(|number| number.as_f64().unwrap());
+    // The contact flickers with 0.5, which is the gain of the task.
+    assert!((0.2..=0.4).contains(&kp), "{kp}");
+    // Without a delay and an integral, the crossover is at kp g.
+    let crossover = feature["margins"][0]["crossover_hz"].as_f64().unwrap() * std::f64::consts::TAU;
+    assert!((1.0..1.3).contains(&(crossover / (kp * gain))), "{crossover} rad/s, {kp}, {gain}");
+}
+
+#[test]
 fn a_task_that_follows_a_cable_is_tuned_while_it_stands() {
     let said = say(&["tune", "graphs/cable.toml", "--feature", "orientation", "--format", "json"]);
     assert_eq!(said.code, 0, "{}{}", said.out, said.err);

@@ -32,6 +32,26 @@ impl Wanted {
     }
 }
 
+impl Wanted {
+    /// Returns what a loop does not keep, for a sentence; `None` if it keeps all.
+    fn broken(self, found: &Margins) -> Option<String> {
+        let gain = found.gain_db.filter(|db| *db < self.gain_db).map(|db| format!("a gain margin of {db:.1} dB"));
+        let phase = found.phase_deg.filter(|deg| *deg < self.phase_deg);
+        let phase = || phase.map(|deg| format!("a phase margin of {deg:.0} deg"));
+        let peak = Some(found.peak_sensitivity).filter(|peak| *peak > self.peak);
+        let peak = || peak.map(|peak| format!("a peak of the sensitivity of {peak:.2}"));
+        let unstable = (!found.is_stable).then(|| "no margins: it is unstable".to_owned());
+        unstable.or(gain).or_else(phase).or_else(peak)
+    }
+}
+
+/// Returns which of the loops allows no larger gains than these: its number, and the margin that a tenth more would break,
+/// for a sentence.
+pub(crate) fn bound(loops: &[Loop], wanted: Wanted) -> Option<(usize, String)> {
+    let broken = |around: &Loop| wanted.broken(&margins(&around.times(STEP)));
+    loops.iter().enumerate().find_map(|(i, around)| Some((i, broken(around)?)))
+}
+
 /// Ratio of two neighbouring gains that are tried, before the last ones are halved.
 const STEP: f64 = 1.1;
 /// Gain around a loop in one period above which nothing is tried [1].
@@ -83,6 +103,24 @@ mod tests {
             ..Feature::default()
         };
         Loop::new(&feature, &Answer { vz: Some(gain), ..Answer::default() }, delay)
+    }
+
+    #[test]
+    fn the_loop_and_the_margin_that_allow_no_more_are_named() {
+        let loops = [around(1.0, 0.05), around(1.0, 0.1)];
+        let factor = factor(&loops, Wanted::default()).unwrap();
+        let (slow, why) = bound(&loops.map(|around| around.times(factor)), Wanted::default()).unwrap();
+        assert_eq!((slow, why.as_str()), (1, "a gain margin of 8.2 dB"));
+        let loose = Wanted { gain_db: 3.0, phase_deg: 10.0, ..Wanted::default() };
+        assert_eq!(bound(&[around(1.0, 0.1)], loose), None, "far from all margins");
+        let found = margins(&around(6.4, 0.1));
+        for (wanted, why) in [
+            (Wanted { gain_db: 3.0, ..Wanted::default() }, "a peak of the sensitivity of"),
+            (Wanted { gain_db: 3.0, phase_deg: 60.0, ..Wanted::default() }, "a phase margin of 53 deg"),
+        ] {
+            let broken = wanted.broken(&found).unwrap();
+            assert!(broken.starts_with(why), "{broken}");
+        }
     }
 
     #[test]

@@ -16,6 +16,10 @@ const AGREES: f64 = 0.2;
 const FURTHER: f64 = 1.3;
 /// Change of the response from one amplitude to the next with which the larger one counts [1].
 const MAX_CHANGE: f64 = 0.5;
+/// The component that presses, and lifts off.
+const PRESSES: usize = 2;
+/// Motions that count where no larger ones do, as a share of one that lifts the pad off [1].
+pub(super) const NEAR: f64 = 0.25;
 
 /// What the motions of all amplitudes say.
 pub(super) struct Response {
@@ -24,6 +28,8 @@ pub(super) struct Response {
     pub(super) growth: Option<f64>,
     /// The limit that has acted most in the last of these motions, if it has acted much.
     pub(super) limited: Option<Limited>,
+    /// Amplitude of the motion that lifts the pad off, if only much smaller ones count [m].
+    pub(super) lifts_off: Option<f64>,
 }
 
 /// Why a response is not known.
@@ -36,7 +42,8 @@ pub(super) struct Refusal {
 /// Moves further and further along a component, as far as the task stays in its mode, and returns the response to the
 /// largest motions that agree. Friction hides a small motion, and gives two of them the same wrong response: no larger
 /// motion may have a larger one. If the last two only differ a little, the larger response counts, which has the smaller
-/// margins: a contact may stiffen when it is pressed further, and press less when it is nearly left.
+/// margins: a contact may stiffen when it is pressed further, and press less when it is nearly left. If a motion lifts
+/// the pad off, and those before it differ much, only those of up to a fourth of it count.
 pub(super) fn agreed(
     experiment: &Experiment<'_>,
     component: usize,
@@ -45,7 +52,8 @@ pub(super) fn agreed(
     let (mut runs, mut limited): (Vec<Vec<Line>>, Vec<Option<Limited>>) = (Vec::new(), Vec::new());
     let mut stopped = None;
     let unit = if component < 3 { "m" } else { "rad" };
-    for amplitude in AMPLITUDES[component / 3] {
+    let amplitudes = AMPLITUDES[component / 3];
+    for amplitude in amplitudes {
         shell.say_beside(&format!("`{}`: a test signal of {amplitude} {unit}", experiment.feature.name));
         match experiment.run(component, amplitude)? {
             Answered::Lines(lines, limit) => {
@@ -59,29 +67,42 @@ pub(super) fn agreed(
             Answered::Interrupted => return Err(Stop::Interrupted),
         }
     }
-    let agree = (1..runs.len()).rev().find(|i| difference(&runs[i - 1], &runs[*i]) < AGREES);
-    let is_loudest = |i: usize| !runs[i + 1..].iter().any(|later| loudness(&runs[i], later) > 1.0 + AGREES);
-    if let Some(i) = agree.filter(|i| is_loudest(*i)) {
-        return Ok(Ok(Response { lines: Line::mean(&runs[..=i]), growth: None, limited: limited[i].take() }));
+    if let Some((lines, growth, last)) = largest(&runs) {
+        return Ok(Ok(Response { lines, growth, limited: limited[last].take(), lifts_off: None }));
     }
-    if let [.., before, last] = &runs[..] {
-        let growth = loudness(before, last);
-        if growth <= 1.0 + MAX_CHANGE && difference(before, last) <= MAX_CHANGE {
-            let lines = if growth > 1.0 { last } else { before }.clone();
-            return Ok(Ok(Response { lines, growth: Some(growth), limited: limited.pop().flatten() }));
-        }
+    // A light contact is not linear where a motion nearly lifts the pad off.
+    let lifts_off = stopped.as_ref().map(|_| amplitudes[runs.len()]).filter(|_| component == PRESSES);
+    let near = |amplitude: &&f64| lifts_off.is_some_and(|lifts_off| **amplitude <= NEAR * lifts_off);
+    if let Some((lines, growth, last)) = largest(&runs[..amplitudes.iter().take_while(near).count()]) {
+        return Ok(Ok(Response { lines, growth, limited: limited[last].take(), lifts_off }));
     }
-    let is_lost = agree.is_none() && stopped.is_some();
+    let agree = (1..runs.len()).any(|i| difference(&runs[i - 1], &runs[i]) < AGREES);
+    let is_lost = !agree && stopped.is_some();
     let lighter = if component < 2 { "; a lighter press has less friction" } else { "" };
     let why = match agree {
-        Some(_) => format!("friction holds the contact back: only the largest test signal moves it{lighter}"),
-        None => stopped.unwrap_or_else(|| {
+        true => format!("friction holds the contact back: only the largest test signal moves it{lighter}"),
+        false => stopped.unwrap_or_else(|| {
             format!(
                 "no two test signals gave the same response at {ENOUGH} frequencies that stand out of the noise{lighter}"
             )
         }),
     };
     Ok(Err(Refusal { why, is_lost }))
+}
+
+/// Returns the response to the largest motions that agree, or to one of the last two if they differ a little: then with
+/// the last one as a multiple of the one before. The number is that of the last motion that counts.
+fn largest(runs: &[Vec<Line>]) -> Option<(Vec<Line>, Option<f64>, usize)> {
+    let agree = (1..runs.len()).rev().find(|i| difference(&runs[i - 1], &runs[*i]) < AGREES);
+    let is_loudest = |i: usize| !runs[i + 1..].iter().any(|later| loudness(&runs[i], later) > 1.0 + AGREES);
+    if let Some(i) = agree.filter(|i| is_loudest(*i)) {
+        return Some((Line::mean(&runs[..=i]), None, i));
+    }
+    let [.., before, last] = runs else { return None };
+    let growth = loudness(before, last);
+    let is_near = growth <= 1.0 + MAX_CHANGE && difference(before, last) <= MAX_CHANGE;
+    let lines = if growth > 1.0 { last } else { before };
+    is_near.then(|| (lines.clone(), Some(growth), runs.len() - 1))
 }
 
 /// Returns the median difference of two responses, over the frequencies where the second motion was larger: 0 if none was,
@@ -111,4 +132,44 @@ fn further(one: &[Line], other: &[Line], of: impl Fn(&Line, &Line) -> f64) -> Op
     let mut found: Vec<f64> = larger.map(|(a, b)| of(a, b)).collect();
     found.sort_by(f64::total_cmp);
     found.get(found.len() / 2).copied()
+}
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::Complex;
+
+    use super::*;
+
+    /// Responses at all frequencies to motions of these amplitudes, each of this size.
+    fn runs<const N: usize>(sizes: [(f64, f64); N]) -> Vec<Vec<Line>> {
+        let line = |(amplitude, size): (f64, f64), i: usize| Line {
+            omega: 1.0 + i as f64,
+            open: Complex::new(0.0, -size),
+            amplitude,
+            error: 0.05,
+        };
+        sizes.into_iter().map(|run| (0..2 * ENOUGH).map(|i| line(run, i)).collect()).collect()
+    }
+
+    /// Returns the response that counts, the growth, and the last motion that counts.
+    fn counts<const N: usize>(sizes: [(f64, f64); N]) -> Option<(f64, Option<f64>, usize)> {
+        largest(&runs(sizes)).map(|(lines, growth, last)| (-lines[0].open.im, growth, last))
+    }
+
+    #[test]
+    fn the_largest_motions_that_agree_count_unless_friction_has_held_them() {
+        let (response, growth, last) = counts([(0.3, 0.5), (1.2, 1.0), (2.4, 1.1), (4.8, 0.6)]).unwrap();
+        assert!((response - 1.1).abs() < 1e-9 && growth.is_none() && last == 2, "{response}");
+        assert_eq!(counts([(0.3, 0.5), (1.2, 0.5), (2.4, 1.0)]), None, "the larger one moves it");
+    }
+
+    #[test]
+    fn of_two_that_differ_a_little_the_larger_response_counts() {
+        let (response, growth, last) = counts([(0.3, 0.2), (1.2, 1.0), (2.4, 1.4)]).unwrap();
+        assert!((response - 1.4).abs() < 1e-9 && (growth.unwrap() - 1.4).abs() < 1e-9 && last == 2);
+        let (response, growth, _) = counts([(0.3, 1.0), (1.2, 0.7)]).unwrap();
+        assert!((response - 1.0).abs() < 1e-9 && (growth.unwrap() - 0.7).abs() < 1e-9);
+        assert_eq!(counts([(0.3, 1.0), (1.2, 1.7)]), None);
+        assert_eq!(counts([(0.3, 1.0)]), None, "one alone says nothing");
+    }
 }

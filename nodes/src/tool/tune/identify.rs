@@ -31,6 +31,9 @@ pub(super) struct Identified {
     /// The limit that acted much while it was measured.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(super) limited: Option<Limited>,
+    /// Amplitude of the motion that lifts the pad off, if only much smaller ones count [m].
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(super) lifts_off: Option<f64>,
     /// Why there is no fit.
     pub(super) refused: Option<String>,
     /// Whether a test signal has ended the mode.
@@ -55,6 +58,7 @@ pub(super) fn identify(experiment: &Experiment<'_>, object: &str, shell: &Shell)
         lines: Vec::new(),
         growth: None,
         limited: None,
+        lifts_off: None,
         refused: None,
         is_lost: false,
     };
@@ -65,11 +69,12 @@ pub(super) fn identify(experiment: &Experiment<'_>, object: &str, shell: &Shell)
             .map_err(|refusal| refusal.why)
             .and_then(|response| Ok((fitted(feature, component, &response)?, response)));
         match fitted {
-            Ok((fit, Response { lines, growth, limited })) => {
+            Ok((fit, Response { lines, growth, limited, lifts_off })) => {
                 found.fits.push((COMPONENTS[component], fit));
                 found.lines.push(lines);
                 found.growth = growth.or(found.growth);
                 found.limited = limited.or(found.limited);
+                found.lifts_off = lifts_off.or(found.lifts_off);
             }
             Err(why) => {
                 (found.refused, found.is_lost) = (Some(why), is_lost);

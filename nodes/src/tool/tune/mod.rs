@@ -54,7 +54,7 @@ use tuned::Tuned;
 fro with sines of 0.2 to 8 Hz, one after the other, and moves further and further. This takes 75 s for each of four
 amplitudes. All limits of the graph hold. From the answers it fits a gain, a resonance and a latency, and
 proposes the largest gains that keep the margins over all contacts. Where friction hides the answers, it compares gains
-by steps of the setpoint instead, for 50 s each. Then it runs the task with the old and the new gains, and compares.
+by steps of the setpoint instead, for 55 s each. Then it runs the task with the old and the new gains, and compares.
 What moves the sensor along the object rests meanwhile.
 
 Examples:

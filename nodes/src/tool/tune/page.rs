@@ -5,11 +5,12 @@ use std::path::Path;
 
 use tactflow_runtime::cli::table;
 
+use super::amplitudes::NEAR;
 use super::cases::Stated;
 use super::climb;
 use super::identify::Identified;
 use super::limited::Limited;
-use super::propose::TunedFeature;
+use super::propose::{Bound, TunedFeature};
 use super::save;
 use super::settled::Held;
 use super::step::{self, Step};
@@ -76,6 +77,13 @@ fn answers(found: &[Identified]) -> String {
              measured: raise the limit, or keep smaller gains."
         );
     }
+    for (object, lifts_off) in found.iter().filter_map(|one| Some((&one.object, one.lifts_off?))) {
+        let most = to_three_digits(NEAR * lifts_off);
+        let _ = writeln!(
+            text,
+            "Over `{object}`, a test signal of {lifts_off} m lifts the pad off, so only those of up to {most} m count."
+        );
+    }
     for (object, why) in found.iter().filter_map(|one| Some((&one.object, one.refused.as_ref()?))) {
         let _ = writeln!(text, "Not measured over `{object}`: {why}.");
     }
@@ -103,7 +111,7 @@ fn climbed(feature: &TunedFeature) -> String {
     let steps = feature.climbed.iter().flat_map(|rung| rung.steps.iter().flatten());
     let size = step::heading(&feature.feature, steps.map(|step| step.size.abs()).next());
     let worst = if feature.answers.len() > 1 { "; each number is that of the worst contact" } else { "" };
-    let mut text = format!("So gains are compared by steps of {size}, up and down{worst}:\n\n");
+    let mut text = format!("So gains are compared by steps of {size}{worst}:\n\n");
     text += &table(&rows, 0, 4);
     if climb::is_bounded(&feature.climbed, feature.most) {
         text += "Larger gains are beyond the margins of what is known of the loop.\n";
@@ -113,7 +121,7 @@ fn climbed(feature: &TunedFeature) -> String {
 
 /// Why no gains are proposed.
 fn why_none(feature: &TunedFeature) -> String {
-    if feature.is_measured() {
+    if feature.is_measured() && !feature.is_light() {
         return "No gain keeps the margins: the motion increases the error.\n".into();
     }
     if feature.is_lost() {
@@ -128,7 +136,7 @@ fn why_none(feature: &TunedFeature) -> String {
         format!(
             "each is near one that fails, or has an error of more than {:.0} % at the end of the steps; a larger setpoint or \
              more filtering lets a step stand out of the noise",
-            100.0 * climb::MAX_REST
+            100.0 * step::MAX_REST
         )
     };
     format!("No gains are proposed: {why}.\n")
@@ -151,6 +159,10 @@ fn gains(feature: &TunedFeature) -> String {
     let rows: Vec<[String; 6]> = [MARGINS.map(str::to_owned)].into_iter().chain(rows).collect();
     let table = if rows.len() > 1 { table(&rows, 1, 6) } else { String::new() };
     let mut text = format!("\nkp {old_kp} becomes {kp}, ki {old_ki} becomes {ki}, kd {old_kd} becomes {kd}:\n{table}");
+    if let Some(Bound { object, is_measured, margin }) = &feature.bound {
+        let of = if *is_measured { "measured response" } else { "loop" };
+        let _ = writeln!(text, "With a tenth more, the {of} over `{object}` has {margin}, which is too little.");
+    }
     for found in feature.answers.iter().filter(|found| found.refused.is_some()) {
         let _ = writeln!(text, "The margins over `{}` are not known.", found.object);
     }

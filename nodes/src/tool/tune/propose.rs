@@ -11,15 +11,25 @@ use super::cases::Case;
 use super::climb::{self, Followed, Rung};
 use super::experiment::{Experiment, HALF};
 use super::identify::{Identified, answer, identify, known, quantity};
-use super::step::Planned;
+use super::step::{Planned, STEPS};
 use super::trial::Trial;
 use crate::motion::COMPONENTS;
-use crate::tool::control::choose::{Wanted, factor};
+use crate::tool::control::choose::{Wanted, bound, factor};
 use crate::tool::control::contacts::Contact;
 use crate::tool::control::digits::{down_to_two_digits, to_three_digits, to_two_digits};
 use crate::tool::control::law::Feature;
 use crate::tool::control::margins::{Margins, margins};
 use crate::tool::control::response::Loop;
+
+/// What allows no larger gains.
+#[derive(Debug, Serialize)]
+pub(super) struct Bound {
+    pub(super) object: String,
+    /// Whether the measured response decides, and not the fit or the geometry.
+    pub(super) is_measured: bool,
+    /// The margin with a tenth more, for a sentence.
+    pub(super) margin: String,
+}
 
 /// One feature, over all contacts.
 #[derive(Debug, Serialize)]
@@ -33,6 +43,9 @@ pub(super) struct TunedFeature {
     pub(super) new: Option<[f64; 3]>,
     /// The margins of the new gains, for each contact over which the response is known.
     pub(super) margins: Vec<Option<Margins>>,
+    /// What allows no larger gains, if the margins decide.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(super) bound: Option<Bound>,
     /// The gains that were compared by steps, because the response is not known over a contact.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub(super) climbed: Vec<Rung>,
@@ -51,6 +64,11 @@ impl TunedFeature {
     /// Returns whether its response is known over all contacts.
     pub(super) fn is_measured(&self) -> bool {
         self.answers.iter().all(|found| found.refused.is_none())
+    }
+
+    /// Returns whether a contact is so light that only small motions say how it answers.
+    pub(super) fn is_light(&self) -> bool {
+        self.answers.iter().any(|found| found.lifts_off.is_some())
     }
 
     /// Returns whether a test signal has ended the mode.
@@ -73,8 +91,9 @@ impl TunedFeature {
 
     /// Sets the gains that are proposed, with their loops and margins.
     fn set(&mut self, new: Option<[f64; 3]>) {
+        let before = self.factor().unwrap_or(1.0);
         self.new = new;
-        let factor = self.factor().unwrap_or(1.0);
+        let factor = self.factor().unwrap_or(1.0) / before;
         self.loops.iter_mut().for_each(|(_, around)| *around = around.times(factor));
         let measured = |i: usize| self.new.is_some() && self.answers[i].refused.is_none();
         let over = |i: usize| self.loops.iter().find(|(contact, _)| *contact == i && measured(i));
@@ -132,8 +151,9 @@ impl Measurement<'_> {
             let again = self.measured(feature, contacts, QUARTER * factor)?;
             found = if again.0.new.is_some() { again } else { found };
         }
-        // What a test signal drives out of its mode may be near instability, and steps would not show it.
-        if !found.0.is_measured() && !found.0.is_lost() {
+        // What a test signal drives out of its mode may be near instability, and steps would not show it. Friction can hide
+        // small motions, so what is known of them alone bounds the gains, and steps must show that they are good.
+        if !found.0.is_measured() && !found.0.is_lost() || found.0.is_light() {
             found.0 = self.climbed(found.0)?;
         }
         Ok(found)
@@ -144,8 +164,11 @@ impl Measurement<'_> {
     fn climbed(&self, mut found: TunedFeature) -> Result<TunedFeature, Stop> {
         let trial = |case| Trial::new(self.shell.catalogue(), case, self.mode, self.adder);
         let trials: Vec<Trial<'_>> = self.cases.iter().map(trial).collect();
-        let steps: Option<Vec<[Planned; 4]>> = trials.iter().map(|trial| trial.steps(&found.feature)).collect();
-        let Some(steps) = steps else { return Ok(found) };
+        let steps: Option<Vec<[Planned; STEPS]>> = trials.iter().map(|trial| trial.steps(&found.feature)).collect();
+        let Some(steps) = steps else {
+            found.set(None);
+            return Ok(found);
+        };
         while let Some(factor) = climb::next(&found.climbed, found.most) {
             let gains = found.near(factor);
             self.shell.say_beside(&format!("`{}`: steps with kp = {}", found.name, gains[0]));
@@ -154,9 +177,10 @@ impl Measurement<'_> {
                 Ok(Followed { object: answer.object.clone(), steps, failure })
             });
             let followed = followed.collect::<Result<Vec<Followed>, Stop>>()?;
-            found.climbed.push(Rung::new(factor, gains, &followed));
+            found.climbed.push(Rung::new(factor, gains, &followed).beside(&found.climbed));
         }
         found.set(climb::best(&found.climbed).map(|rung| rung.gains));
+        found.bound = None;
         Ok(found)
     }
 
@@ -195,17 +219,25 @@ fn propose(feature: Feature, answers: Vec<Identified>, contacts: &[Contact], wan
     let measured = |(i, around): &(usize, Loop)| match (&answers[*i].fits[..], &answers[*i].lines[..]) {
         ([(component, fit)], [lines]) => {
             let component = COMPONENTS.iter().position(|name| name == component)?;
-            Some(around.measured(fit.missed(lines, known(&feature, component))))
+            Some((*i, around.measured(fit.missed(lines, known(&feature, component)))))
         }
         _ => None,
     };
-    let each: Vec<Loop> = loops.iter().filter_map(measured).chain(loops.iter().map(|(_, one)| one.clone())).collect();
+    let measured: Vec<(usize, Loop)> = loops.iter().filter_map(measured).collect();
+    let all = || measured.iter().chain(&loops);
+    let each: Vec<Loop> = all().map(|(_, one)| one.clone()).collect();
     let known = factor(&each, wanted);
-    let factor = known.filter(|_| loops.len() == contacts.len());
-    let (name, climbed) = (feature.name.clone(), Vec::new());
+    let factor = known.filter(|_| loops.len() == contacts.len() && answers.iter().all(|found| found.refused.is_none()));
+    let bound = factor.and_then(|factor| {
+        let scaled: Vec<Loop> = each.iter().map(|around| around.times(factor)).collect();
+        let (which, margin) = bound(&scaled, wanted)?;
+        let (contact, _) = all().nth(which)?;
+        Some(Bound { object: answers[*contact].object.clone(), is_measured: which < measured.len(), margin })
+    });
+    let (name, climbed, margins) = (feature.name.clone(), Vec::new(), Vec::new());
     let most = if each.is_empty() { f64::INFINITY } else { known.unwrap_or_default() };
-    let mut found = TunedFeature { name, answers, old, new: None, margins: Vec::new(), climbed, most, feature, loops };
+    let mut found = TunedFeature { name, answers, old, new: None, margins, bound, climbed, most, feature, loops };
     // Rounded down, so that the margins hold.
-    found.set(factor.filter(|_| found.is_measured()).map(|factor| found.times(factor, down_to_two_digits)));
+    found.set(factor.map(|factor| found.times(factor, down_to_two_digits)));
     found
 }

@@ -11,7 +11,9 @@ use crate::tool::control::nodes::{Index, Nodes, mode_flag, toml};
 /// How long a task holds its setpoints before the first step [s].
 const BEFORE_S: f64 = 12.0;
 /// How long a setpoint stays changed [s].
-const LASTS_S: f64 = 8.0;
+const LASTS_S: f64 = 5.0;
+/// Number of steps with which gains are compared.
+pub(super) const STEPS: usize = 8;
 /// Beginning of the names of the modes with a changed setpoint.
 const MODE: &str = "tune_step";
 /// Step of a place [m], which is more than most contacts stick, and its largest share of the pad [1]; that of an angle
@@ -28,8 +30,8 @@ const FOLLOWED: f64 = 0.9;
 const REST: f64 = 0.25;
 /// Largest overshoot, and largest error at the end, of gains that are good whatever the old ones do [1]. A peak of the
 /// sensitivity of 1.7 has an overshoot of about 0.4.
-const MAX_OVERSHOOT: f64 = 0.6;
-const MAX_REST: f64 = 0.3;
+pub(super) const MAX_OVERSHOOT: f64 = 0.6;
+pub(super) const MAX_REST: f64 = 0.3;
 /// Overshoot or error at the end, as a multiple of that with the old gains, from which on it is worse [1].
 const WORSE: f64 = 1.2;
 /// Error before a step, as a share of it, up to which the response to the step says something [1].
@@ -105,6 +107,8 @@ pub(super) struct Planned {
     /// The setpoint before it.
     setpoint: f64,
     pub(super) size: f64,
+    /// Whether the setpoint may also become less: a light press would lose its contact.
+    may_be_less: bool,
 }
 
 /// Returns the step of each feature; `None` if its setpoint is not known, or if a node reads the flag of the mode.
@@ -116,12 +120,12 @@ pub(super) fn plan(outline: &Outline, mode: &OutlinedMode, features: &[&Feature]
     let one = |feature: &&Feature| {
         let compared = feature.compared.as_deref().filter(|_| !reads_mode)?;
         let setpoint = setpoint(&nodes, compared, &feature.name)?;
-        let size = match feature.quantity()? {
-            "x" | "y" => extent(&nodes, feature).map_or(PLACE, |extent| PLACE.min(PLACE_SHARE * extent)),
-            "orientation" | "angle" => ANGLE,
-            _ => SHARE * setpoint.abs(),
+        let (size, may_be_less) = match feature.quantity()? {
+            "x" | "y" => (extent(&nodes, feature).map_or(PLACE, |extent| PLACE.min(PLACE_SHARE * extent)), true),
+            "orientation" | "angle" => (ANGLE, true),
+            _ => (SHARE * setpoint.abs(), false),
         };
-        (size > 0.0).then_some(Planned { setpoint, size })
+        (size > 0.0).then_some(Planned { setpoint, size, may_be_less })
     };
     features.iter().map(one).collect()
 }
@@ -150,11 +154,14 @@ pub(super) fn heading(feature: &Feature, size: Option<f64>) -> String {
     size.unwrap_or_else(|| format!("{:.0} % of the setpoint", 100.0 * SHARE))
 }
 
-/// Returns steps of one feature: up, back, down, and back.
-pub(super) fn to_and_fro(step: Planned) -> [Planned; 4] {
-    let Planned { setpoint, size } = step;
-    let from = |setpoint: f64, size: f64| Planned { setpoint, size };
-    [from(setpoint, size), from(setpoint + size, -size), from(setpoint, -size), from(setpoint - size, size)]
+/// Returns steps of one feature: up, back, down, and back, and so on. What may not be less only steps up and back.
+pub(super) fn to_and_fro(step: Planned) -> [Planned; STEPS] {
+    let Planned { setpoint, size, may_be_less } = step;
+    let from = |setpoint: f64, size: f64| Planned { setpoint, size, may_be_less };
+    let up = [from(setpoint, size), from(setpoint + size, -size)];
+    let down = if may_be_less { [from(setpoint, -size), from(setpoint - size, size)] } else { up };
+    let once = [up[0], up[1], down[0], down[1]];
+    std::array::from_fn(|i| once[i % once.len()])
 }
 
 /// Returns the end of the rows of a mode, in which its features must rest.
@@ -264,6 +271,15 @@ mod tests {
         let features: Vec<&Feature> = law.features.iter().collect();
         let steps = plan(compiled.outline(), mode, &features);
         steps.into_iter().map(|step| step.unwrap().size).collect()
+    }
+
+    #[test]
+    fn a_place_steps_to_both_sides_and_a_pressure_never_becomes_less() {
+        for (may_be_less, setpoints) in [(true, [3.0, 2.0, 1.0, 2.0]), (false, [3.0, 2.0, 3.0, 2.0])] {
+            let steps = to_and_fro(Planned { setpoint: 2.0, size: 1.0, may_be_less });
+            let reached: Vec<f64> = steps.iter().map(|step| step.setpoint + step.size).collect();
+            assert_eq!(reached, [setpoints, setpoints].concat());
+        }
     }
 
     #[test]

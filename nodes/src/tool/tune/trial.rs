@@ -8,7 +8,7 @@ use tactflow_runtime::record::PortColumns;
 
 use super::cases::Case;
 use super::course::Course;
-use super::step::{self, Planned, Step};
+use super::step::{self, Planned, STEPS, Step};
 use super::{Stop, gain_keys, lift, signal};
 use crate::tool::control::law::Feature;
 
@@ -33,7 +33,7 @@ impl<'a> Trial<'a> {
     }
 
     /// Returns the steps of a feature up and down; `None` if its setpoint has none.
-    pub(super) fn steps(&self, feature: &Feature) -> Option<[Planned; 4]> {
+    pub(super) fn steps(&self, feature: &Feature) -> Option<[Planned; STEPS]> {
         step::plan(self.outline, self.mode, &[feature])[0].map(step::to_and_fro)
     }
 
@@ -41,11 +41,11 @@ impl<'a> Trial<'a> {
     pub(super) fn to_and_fro(
         &self,
         feature: &Feature,
-        steps: &[Planned; 4],
+        steps: &[Planned; STEPS],
         gains: [f64; 3],
     ) -> Result<(Vec<Option<Step>>, Option<String>), Stop> {
         let gains = gain_keys::gains(feature, self.mode, gains);
-        let (seen, failure) = self.follow(&[feature; 4], &steps.map(Some), &gains)?;
+        let (seen, failure) = self.follow(&[feature; STEPS], &steps.map(Some), &gains)?;
         let each = seen.iter().zip(steps).map(|(seen, step)| Step::of(step.size, &seen.after, self.outline.period_s));
         Ok((each.collect(), failure))
     }
