@@ -2,13 +2,9 @@
 
 use serde::Serialize;
 use tactflow_runtime::engine::Engine;
-use tactflow_runtime::node::PortId;
-use tactflow_runtime::signal::Scalar;
 
 /// Part of the ticks from which on a limit makes a response another one [1]. Those of the fastest sines alone are less.
 const MUCH: f64 = 0.2;
-/// A scale that differs from one by less is no limit [1].
-const ROUNDING: f64 = 1e-6;
 
 /// A limit that has reduced the motion.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -21,28 +17,27 @@ pub(super) struct Limited {
 
 /// The limits of a run, with the number of ticks in which each of them has reduced the motion.
 pub(super) struct Watch {
-    limits: Vec<(String, PortId, usize)>,
+    limits: Vec<(String, usize)>,
     ticks: usize,
 }
 
 impl Watch {
     pub(super) fn new(engine: &Engine) -> Self {
-        let limits = engine.limits().map(|(name, id)| (name.to_owned(), id, 0));
+        let limits = engine.limits().map(|(name, _)| (name.to_owned(), 0));
         Self { limits: limits.collect(), ticks: 0 }
     }
 
     /// Counts the last tick of the engine.
     pub(super) fn see(&mut self, engine: &Engine) {
         self.ticks += 1;
-        for (_, id, count) in &mut self.limits {
-            let scale = engine.bus().get::<Scalar>(*id);
-            *count += usize::from(scale.is_some_and(|scale| *scale < 1.0 - ROUNDING));
+        for ((_, count), (_, scale)) in self.limits.iter_mut().zip(engine.limits()) {
+            *count += usize::from(scale < 1.0);
         }
     }
 
     /// Returns the limit that has acted most, if it has acted much.
     pub(super) fn most(&self) -> Option<Limited> {
-        let (limit, _, count) = self.limits.iter().max_by_key(|(_, _, count)| *count)?;
+        let (limit, count) = self.limits.iter().max_by_key(|(_, count)| *count)?;
         let share = *count as f64 / self.ticks.max(1) as f64;
         (share > MUCH).then(|| Limited { limit: limit.clone(), share })
     }

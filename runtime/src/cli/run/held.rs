@@ -3,8 +3,6 @@
 use crate::cli::text::number::{number, seconds};
 use crate::cli::text::table::table;
 use crate::engine::{Engine, ModeChange};
-use crate::node::PortId;
-use crate::signal::Scalar;
 
 /// A motion that is scaled below this counts as stopped [1].
 const STOPPED_SCALE: f64 = 0.1;
@@ -12,8 +10,6 @@ const STOPPED_SCALE: f64 = 0.1;
 const MIN_STOPPED_S: f64 = 2.0;
 /// Part of the time of the last mode, and of the run, from which on a stop is reported [1].
 const MIN_SHARE: [f64; 2] = [0.5, 0.2];
-/// A scale that differs from one by less is no limit [1].
-const ROUNDING: f64 = 1e-6;
 /// Modes chatter if they change more often than this within [`CHATTER_NS`].
 const MAX_CHANGES: usize = 20;
 /// Time in which changes of modes are counted [ns].
@@ -23,7 +19,6 @@ const CHATTER_NS: i64 = 5_000_000_000;
 struct LimitUse {
     /// `node.limit`.
     name: String,
-    id: PortId,
     /// Time during which it reduced the motion [s].
     reduced: f64,
     /// Factor by which it scales the motion now [1].
@@ -49,9 +44,8 @@ pub(crate) struct LimitWatch {
 
 impl LimitWatch {
     pub(crate) fn new(engine: &Engine, start: Option<String>) -> Self {
-        let limit = |(name, id): (&str, PortId)| LimitUse {
+        let limit = |(name, _): (&str, f64)| LimitUse {
             name: name.to_owned(),
-            id,
             reduced: 0.0,
             scale: 1.0,
             smallest_scale: 1.0,
@@ -70,11 +64,9 @@ impl LimitWatch {
             (self.mode, self.since) = (engine.mode_number(), now);
             self.limits.iter_mut().for_each(|limit| limit.stopped_in_mode = 0.0);
         }
-        for limit in &mut self.limits {
-            limit.scale = 1.0;
-            let Some(&scale) = engine.bus().get::<Scalar>(limit.id) else { continue };
+        for (limit, (_, scale)) in self.limits.iter_mut().zip(engine.limits()) {
             limit.scale = scale;
-            if scale < 1.0 - ROUNDING {
+            if scale < 1.0 {
                 limit.reduced += dt;
                 limit.smallest_scale = limit.smallest_scale.min(scale);
             }
@@ -87,7 +79,7 @@ impl LimitWatch {
 
     /// Returns the limits that reduce the motion now, each with its scale [1].
     pub(crate) fn acting(&self) -> impl Iterator<Item = (&str, f64)> {
-        let acting = self.limits.iter().filter(|limit| limit.scale < 1.0 - ROUNDING);
+        let acting = self.limits.iter().filter(|limit| limit.scale < 1.0);
         acting.map(|limit| (limit.name.as_str(), limit.scale))
     }
 

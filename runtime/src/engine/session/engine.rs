@@ -12,8 +12,11 @@ use crate::engine::core::{Core, Counters, DeviceLink, DeviceSlot, ModeChange, Ti
 use crate::fault::Fault;
 use crate::graph::{AllowedWarning, PlannedPort, Reach, RecordedPorts};
 use crate::node::{Bus, PortId};
-use crate::signal::{Mark, Signal};
+use crate::signal::{Mark, Scalar, Signal};
 use crate::source::{SourceMap, suggestion};
+
+/// A scale that differs from one by less is no limit [1].
+const ROUNDING: f64 = 1e-6;
 
 /// A running graph.
 pub struct Engine {
@@ -263,10 +266,11 @@ impl Engine {
         &self.display
     }
 
-    /// Returns the name `node.limit` of each limit, and the port on which it reports the scale of the motion, from 0 to
-    /// 1.
-    pub fn limits(&self) -> impl Iterator<Item = (&str, PortId)> {
-        self.limits.iter().map(|(name, id)| (name.as_str(), *id))
+    /// Returns the name `node.limit` of each limit, and the factor by which it scales the motion in the last tick [1]: from
+    /// 0, where it stops it, to 1, where it does not act. The order is always the same.
+    pub fn limits(&self) -> impl Iterator<Item = (&str, f64)> {
+        let scale = |id| self.bus().get::<Scalar>(id).copied().filter(|scale| *scale < 1.0 - ROUNDING).unwrap_or(1.0);
+        self.limits.iter().map(move |(name, id)| (name.as_str(), scale(*id)))
     }
 
     /// Returns the roles that are commanded, each once.

@@ -129,7 +129,6 @@ pub(super) fn ramp_s(scene: &Scene, commands: &[f64]) -> f64 {
 struct Probe {
     sides: Vec<[Option<PortId>; 3]>,
     image: Option<PortId>,
-    limits: Vec<PortId>,
 }
 
 impl Probe {
@@ -141,7 +140,6 @@ impl Probe {
         Self {
             sides: scene.sides.iter().map(side).collect(),
             image: scene.sides.first().and_then(|side| id(&side.image)),
-            limits: engine.limits().map(|(_, id)| id).collect(),
         }
     }
 
@@ -156,11 +154,10 @@ impl Probe {
                 velocity: twist.and_then(|id| bus.get::<Twist>(id)).map(Twist::linear),
             }
         };
-        let scale = |id: &PortId| bus.get::<Scalar>(*id).copied().unwrap_or(1.0);
         Moment {
             time: seconds(engine.now()),
             sides: self.sides.iter().map(side).collect(),
-            is_limited: self.limits.iter().any(|id| scale(id) < 0.999),
+            is_limited: engine.limits().any(|(_, scale)| scale < 0.999),
             commands: commands(scene, engine),
         }
     }
