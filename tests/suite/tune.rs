@@ -213,6 +213,16 @@ fn a_loop_that_loses_its_contact_is_measured_again_with_smaller_gains() {
 }
 
 #[test]
+fn a_task_that_does_not_reach_the_mode_is_run_once_and_says_why() {
+    let said = say(&["tune", "graphs/force.toml", "--set", "devices.bench.objects=[]"]);
+    assert_eq!(said.code, 1, "{}{}", said.out, said.err);
+    assert_eq!(said.err.matches("a test signal of").count(), 1, "{}", said.err);
+    for text in ["the task does not reach the mode `servo`: ", "the sensor has moved 60 mm", "`tactflow run` shows"] {
+        assert!(said.out.contains(text), "{}", said.out);
+    }
+}
+
+#[test]
 fn a_limit_that_acts_while_a_response_is_measured_is_named() {
     let slow = ["tune", "graphs/force.toml", "--set", "limits.linear_m_per_s=0.004"];
     let said = say(&slow);

@@ -35,8 +35,18 @@ pub(super) struct Response {
 /// Why a response is not known.
 pub(super) struct Refusal {
     pub(super) why: String,
-    /// Whether a test signal has ended the mode, so that smaller gains may help.
-    pub(super) is_lost: bool,
+    pub(super) kind: Unknown,
+}
+
+/// What hides a response.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Unknown {
+    /// Noise or friction.
+    Hidden,
+    /// A test signal has ended the mode: smaller gains may help.
+    Lost,
+    /// The task has not reached the mode.
+    NotReached,
 }
 
 /// Moves further and further along a component, as far as the task stays in its mode, and returns the response to the
@@ -64,6 +74,13 @@ pub(super) fn agreed(
                 stopped = Some(format!("with a test signal of {amplitude} {unit}, {reason}"));
                 break;
             }
+            Answered::NotReached(why) if runs.is_empty() => {
+                return Ok(Err(Refusal { why, kind: Unknown::NotReached }));
+            }
+            Answered::NotReached(why) => {
+                stopped = Some(why);
+                break;
+            }
             Answered::Interrupted => return Err(Stop::Interrupted),
         }
     }
@@ -77,7 +94,7 @@ pub(super) fn agreed(
         return Ok(Ok(Response { lines, growth, limited: limited[last].take(), lifts_off }));
     }
     let agree = (1..runs.len()).any(|i| difference(&runs[i - 1], &runs[i]) < AGREES);
-    let is_lost = !agree && stopped.is_some();
+    let kind = if !agree && stopped.is_some() { Unknown::Lost } else { Unknown::Hidden };
     let lighter = if component < 2 { "; a lighter press has less friction" } else { "" };
     let why = match agree {
         true => format!("friction holds the contact back: only the largest test signal moves it{lighter}"),
@@ -87,7 +104,7 @@ pub(super) fn agreed(
             )
         }),
     };
-    Ok(Err(Refusal { why, is_lost }))
+    Ok(Err(Refusal { why, kind }))
 }
 
 /// Returns the response to the largest motions that agree, or to one of the last two if they differ a little: then with

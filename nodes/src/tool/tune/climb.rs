@@ -31,7 +31,7 @@ const SWINGS: f64 = 2.0;
 const FAILURES: usize = 4;
 /// Largest overshoot of gains that are good, in the mean over the steps [1]. A loop with a latency has it with a gain
 /// margin of 6 dB, and [`MAX_OVERSHOOT`] with 3 dB, so half of the gains that fail have 9 dB.
-const GOOD_OVERSHOOT: f64 = 0.3;
+pub(super) const GOOD_OVERSHOOT: f64 = 0.3;
 
 /// How a feature follows steps with some gains.
 #[derive(Debug, Clone, PartialEq, Serialize)]

@@ -46,6 +46,8 @@ pub(super) enum Answered {
     Lines(Vec<Line>, Option<Limited>),
     /// Why there are none, such as a mode that was left.
     Nothing(String),
+    /// Why the task has not reached the mode.
+    NotReached(String),
     /// Somebody interrupted it.
     Interrupted,
 }
@@ -85,6 +87,9 @@ impl Experiment<'_> {
         let (rows, left) = (stay.rows(), stay.left());
         Ok(match (&outcome.end, left) {
             (End::Interrupted, _) => Answered::Interrupted,
+            (end, _) if rows.is_empty() => {
+                Answered::NotReached(format!("the task does not reach the mode `{}`: {end}", self.mode.name))
+            }
             (End::Fault(fault), _) => Answered::Nothing(fault.to_string()),
             (_, Some(mode)) => Answered::Nothing(format!("the mode `{}` was left for `{mode}`", self.mode.name)),
             _ if rows.len() < wanted => {

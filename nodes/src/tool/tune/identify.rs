@@ -5,7 +5,7 @@ use serde::Serialize;
 use tactflow_runtime::cli::Shell;
 
 use super::Stop;
-use super::amplitudes::{Response, agreed};
+use super::amplitudes::{Response, Unknown, agreed};
 use super::experiment::{Experiment, HALF};
 use super::fit::{ENOUGH, Fit, fit};
 use super::limited::Limited;
@@ -36,9 +36,9 @@ pub(super) struct Identified {
     pub(super) lifts_off: Option<f64>,
     /// Why there is no fit.
     pub(super) refused: Option<String>,
-    /// Whether a test signal has ended the mode.
+    /// What hides the response, if there is no fit.
     #[serde(skip)]
-    pub(super) is_lost: bool,
+    pub(super) unknown: Option<Unknown>,
 }
 
 /// Part of the answer by geometry below which a contact sticks [1].
@@ -60,11 +60,11 @@ pub(super) fn identify(experiment: &Experiment<'_>, object: &str, shell: &Shell)
         limited: None,
         lifts_off: None,
         refused: None,
-        is_lost: false,
+        unknown: None,
     };
     for component in (0..6).filter(|i| feature.column[*i] != 0.0) {
         let response = agreed(experiment, component, shell)?;
-        let is_lost = response.as_ref().err().is_some_and(|refusal| refusal.is_lost);
+        let unknown = response.as_ref().err().map_or(Unknown::Hidden, |refusal| refusal.kind);
         let fitted = response
             .map_err(|refusal| refusal.why)
             .and_then(|response| Ok((fitted(feature, component, &response)?, response)));
@@ -77,7 +77,7 @@ pub(super) fn identify(experiment: &Experiment<'_>, object: &str, shell: &Shell)
                 found.lifts_off = lifts_off.or(found.lifts_off);
             }
             Err(why) => {
-                (found.refused, found.is_lost) = (Some(why), is_lost);
+                (found.refused, found.unknown) = (Some(why), Some(unknown));
                 break;
             }
         }

@@ -5,7 +5,7 @@ use std::path::Path;
 
 use tactflow_runtime::cli::table;
 
-use super::amplitudes::NEAR;
+use super::amplitudes::{NEAR, Unknown};
 use super::cases::Stated;
 use super::climb;
 use super::identify::Identified;
@@ -124,7 +124,12 @@ fn why_none(feature: &TunedFeature) -> String {
     if feature.is_measured() && !feature.is_light() {
         return "No gain keeps the margins: the motion increases the error.\n".into();
     }
-    if feature.is_lost() {
+    if feature.is(Unknown::NotReached) {
+        return "No gains are proposed: the task must reach the mode with half of these gains; `tactflow run` shows what it \
+                does.\n"
+            .into();
+    }
+    if feature.is(Unknown::Lost) {
         return "No gains are proposed: start with a gain at which the test signal does not end the mode.\n".into();
     }
     let why = if climb::next(&[], feature.most).is_none() {
@@ -134,8 +139,9 @@ fn why_none(feature: &TunedFeature) -> String {
             .into()
     } else {
         format!(
-            "each is near one that fails, or has an error of more than {:.0} % at the end of the steps; a larger setpoint or \
-             more filtering lets a step stand out of the noise",
+            "each is near one that fails, overshoots by more than {:.0} %, or has an error of more than {:.0} % at the end of \
+             the steps; a larger setpoint or more filtering lets a step stand out of the noise",
+            100.0 * climb::GOOD_OVERSHOOT,
             100.0 * step::MAX_REST
         )
     };

@@ -7,6 +7,7 @@ use tactflow_runtime::cli::Shell;
 use tactflow_runtime::graph::{Outline, OutlinedMode};
 
 use super::Stop;
+use super::amplitudes::Unknown;
 use super::cases::Case;
 use super::climb::{self, Followed, Rung};
 use super::experiment::{Experiment, HALF};
@@ -71,9 +72,14 @@ impl TunedFeature {
         self.answers.iter().any(|found| found.lifts_off.is_some())
     }
 
-    /// Returns whether a test signal has ended the mode.
-    pub(super) fn is_lost(&self) -> bool {
-        self.answers.iter().any(|found| found.is_lost)
+    /// Returns whether this hides the response over a contact.
+    pub(super) fn is(&self, unknown: Unknown) -> bool {
+        self.answers.iter().any(|found| found.unknown == Some(unknown))
+    }
+
+    /// Returns whether noise or friction alone hide the responses that are not known.
+    fn is_hidden(&self) -> bool {
+        !self.is_measured() && !self.is(Unknown::Lost) && !self.is(Unknown::NotReached)
     }
 
     /// Returns the gains of the graph times a factor: `kp` with a few digits, and the others in their ratio to it.
@@ -135,7 +141,7 @@ impl Measurement<'_> {
         let say = |gains: &str| self.shell.say_beside(&format!("`{}`: again, with {gains}", feature.name));
         let mut found = self.measured(feature, contacts, HALF)?;
         for (share, name) in SMALLER {
-            if !found.0.is_lost() {
+            if !found.0.is(Unknown::Lost) || found.0.is(Unknown::NotReached) {
                 break;
             }
             // A loop that hardly holds the contact loses it with a test signal.
@@ -153,7 +159,7 @@ impl Measurement<'_> {
         }
         // What a test signal drives out of its mode may be near instability, and steps would not show it. Friction can hide
         // small motions, so what is known of them alone bounds the gains, and steps must show that they are good.
-        if !found.0.is_measured() && !found.0.is_lost() || found.0.is_light() {
+        if found.0.is_hidden() || found.0.is_measured() && found.0.is_light() {
             found.0 = self.climbed(found.0)?;
         }
         Ok(found)
