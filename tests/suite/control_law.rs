@@ -122,7 +122,7 @@ fn every_shipped_task_is_explained_for_a_person_and_for_a_page() {
     for text in [
         "in the mode `servo`",
         "-3.5",
-        "`pid` lets the control of `x` grow by at most 0.25 per s2",
+        "`pid` lets the control of `x` grow by at most 0.25 m/s2",
         "At rest: wx, wy, wz.",
         "`move.contact` (`contact_limit`)",
         "force_n = 15.0",
@@ -136,6 +136,17 @@ fn one_port_is_explained_and_an_unknown_one_is_named() {
     let port = explained(&["graphs/hybrid.toml", "move.bumpless.twist"]);
     let limits = port["motions"][0]["limits"].as_array().unwrap().iter().map(|limit| limit["node"].as_str().unwrap());
     assert_eq!(limits.collect::<Vec<_>>(), ["damping", "move.bumpless"]);
+    // Its loops are those of the command, over the contacts that the bench states.
+    let all = explained(&["graphs/hybrid.toml"]);
+    for twist in ["move.bumpless.twist", "projector.twist"] {
+        let port = explained(&["graphs/hybrid.toml", twist]);
+        let loops = |page: &Value| page["motions"][0]["modes"][1]["loops"].clone();
+        assert_eq!(loops(&port), loops(&all), "{twist}");
+        assert!(loops(&all)[0]["object"] == "ball", "{all}");
+    }
+    let other = say(&["explain", "graphs/hybrid.toml", "pid.control"]);
+    assert_eq!(other.code, 2, "{}", other.out);
+    assert!(other.err.contains("`pid.control` carries features: name a port that carries a twist"), "{}", other.err);
     let unknown = say(&["explain", "graphs/hybrid.toml", "move.bumples.twist"]);
     assert_eq!(unknown.code, 2);
     assert!(unknown.err.contains("no node writes `move.bumples.twist`"), "{}", unknown.err);

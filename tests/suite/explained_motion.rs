@@ -57,6 +57,29 @@ fn the_lag_behind_a_ramp_is_the_one_that_explain_prints() {
     }
 }
 
+#[test]
+fn a_filter_does_not_change_the_lag_behind_an_edge_that_turns_and_an_integral_takes_it_away() {
+    let turns = "devices.bench.objects.0.motion=[{ from_s = 4.0, to_s = 12.0, turn = -0.8, steady = true }]";
+    for (ki, left) in [(0.0, 1.0), (4.0, 0.0)] {
+        let gains =
+            ["kp=4.0".to_owned(), format!("ki={ki:?}")].map(|gain| format!("nodes.pid.gains.orientation.{gain}"));
+        let filter = "nodes.direction.window=40".to_owned();
+        let sets: Vec<&str> = gains.iter().chain([&filter]).flat_map(|set| ["--set", set]).collect();
+        let page = explained(&[&["graphs/edge.toml"], &sets[..]].concat());
+        let modes = page["motions"][0]["modes"].as_array().unwrap();
+        let loops = modes.iter().flat_map(|mode| mode["loops"].as_array().unwrap());
+        let margins = loops.clone().find(|one| one["feature"] == "orientation").unwrap()["margins"].clone();
+        let lag = margins["ramp_lag_s"].as_f64().unwrap();
+        assert_eq!(margins["integral_s"].as_f64(), (ki > 0.0).then_some(1.0), "{margins}");
+        let rows = recorded(&[&["graphs/edge.toml", "--set", turns], &sets[..]].concat(), "11.9s");
+        // The edge turns by 0.1 rad/s.
+        let errors = rows.iter().filter(|row| row["time"] > 9.0).map(|row| row["error.error.orientation"] / 0.1);
+        let errors: Vec<f64> = errors.collect();
+        let ran = errors.iter().sum::<f64>().abs() / errors.len() as f64;
+        assert!((ran - left * lag).abs() < 0.2 * lag, "{ran} s, explained {lag} s, of which {left} is left");
+    }
+}
+
 /// Period of the rows [s].
 const PERIOD: f64 = 0.004;
 /// A step of the setpoint of a feature: from the first value to the second at 6 s, and back at 10 s.

@@ -25,8 +25,10 @@ pub(crate) struct Margins {
     /// Where the bandwidth lies if a feature follows by up to 15 % more or less than computed [Hz]: far apart where the
     /// feature follows by about 71 % over many frequencies.
     pub(crate) bandwidth_range_hz: Option<[f64; 2]>,
-    /// Error of the feature for a steady motion of one unit in each second [s].
+    /// Error of the feature for a steady motion of one unit in each second, by the proportional gain [s].
     pub(crate) ramp_lag_s: f64,
+    /// Time constant with which the integral takes this error away [s]; `None` without one.
+    pub(crate) integral_s: Option<f64>,
     /// Standard deviation of the feature for one of white noise in the measurement [1].
     pub(crate) noise: f64,
 }
@@ -39,6 +41,12 @@ const UNSURE: f64 = 0.15;
 const WIDE: f64 = 2.0;
 
 impl Margins {
+    /// Returns the error behind a ramp as text, and after how long an integral has taken 95 % of it away.
+    pub(crate) fn ramp_lag(&self) -> String {
+        let first = format!("{:.0} ms", 1e3 * self.ramp_lag_s);
+        self.integral_s.map_or(first.clone(), |constant| format!("{first}, 0 after {:.1} s", 3.0 * constant))
+    }
+
     /// Returns the bandwidth as text: a range where it is no number.
     pub(crate) fn bandwidth(&self) -> String {
         match (self.bandwidth_hz, self.bandwidth_range_hz) {
@@ -89,6 +97,7 @@ fn swept(around: &Loop, frequencies: usize) -> Margins {
             .zip(last_passed(&open, HALF_POWER * (1.0 - UNSURE)))
             .map(Into::into),
         ramp_lag_s: around.ramp_lag(),
+        integral_s: around.integral_s(),
         noise: noise(&open, around.period),
     }
 }
@@ -192,7 +201,7 @@ mod tests {
         near(found.crossover_hz, gain / (2.0 * PI), 0.01);
         near(found.phase_deg, 90.0 - (gain * delay).to_degrees(), 0.01);
         near(found.gain_db, 20.0 * (PI / (2.0 * gain * delay)).log10(), 0.01);
-        near(Some(found.ramp_lag_s), 1.0 / gain + delay, 1e-9);
+        near(Some(found.ramp_lag_s), 1.0 / gain, 1e-9);
         for (gain, is_stable) in [(15.0, true), (15.5, true), (15.9, false), (40.0, false)] {
             assert_eq!(integrator(gain, 0.0, delay, None, 1e-5).is_stable, is_stable, "{gain}: the bound is pi / 0.2");
         }
@@ -223,7 +232,8 @@ mod tests {
     fn two_integrators_are_stable_and_follow_a_ramp() {
         // kp / s + ki / s^2: damped with zeta = kp / (2 sqrt(ki)).
         let found = integrator(2.0, 1.0, 0.0, None, 1e-4);
-        assert!(found.is_stable && found.ramp_lag_s == 0.0, "{found:?}");
+        assert!(found.is_stable && found.ramp_lag_s == 0.5, "{found:?}");
+        near(found.integral_s, 2.0, 1e-9);
         // |S| of s^2 / (s + 1)^2 never exceeds 1.
         assert!((found.peak_sensitivity - 1.0).abs() < 1e-3, "{found:?}");
     }

@@ -114,10 +114,16 @@ impl Loop {
         [self.kp, self.ki, self.kd].iter().any(|gain| gain * self.gain < 0.0)
     }
 
-    /// Returns how long the error of a steady ramp is ahead [s]: the lag of `kp` without an integral, and all delays.
+    /// Returns the error behind a steady ramp of one unit in each second, by `kp` alone [s]. Delays do not change it,
+    /// because the error is constant then.
     pub(crate) fn ramp_lag(&self) -> f64 {
-        let lag = if self.integrators() == 1 { 1.0 / self.proportional() } else { 0.0 };
-        lag + self.latency + self.shapes.iter().map(|shape| shape.delay(self.period)).sum::<f64>()
+        1.0 / self.proportional()
+    }
+
+    /// Returns the time constant with which an integral takes this error away [s]; `None` without one.
+    pub(crate) fn integral_s(&self) -> Option<f64> {
+        let integral: f64 = self.all().map(|one| one.ki * one.gain).sum();
+        (integral != 0.0).then(|| self.proportional() / integral)
     }
 
     /// Returns L at a circular frequency [rad/s].

@@ -104,8 +104,9 @@ pub(super) fn run(args: ExplainArgs, shell: &Shell) -> Result<u8, u8> {
 fn explain(compiled: &Compiled, port: Option<&str>) -> Result<Explained, String> {
     let outline = compiled.outline();
     let index = Index::new(outline);
+    port.map_or(Ok(()), |port| is_motion(&index, port))?;
     let motions: Vec<Result<Motion, String>> = match port {
-        Some(port) => vec![motion(compiled, &index, port.to_owned(), Command { arm: "", port })],
+        Some(port) => vec![motion(compiled, &index, port.to_owned(), Command { arm: arm_behind(&index, port), port })],
         None => commands(outline).map(|one| motion(compiled, &index, format!("{}.velocity", one.arm), one)).collect(),
     };
     if motions.is_empty() {
@@ -114,8 +115,26 @@ fn explain(compiled: &Compiled, port: Option<&str>) -> Result<Explained, String>
     Ok(Explained { period_s: outline.period_s, motions: motions.into_iter().collect::<Result<_, _>>()? })
 }
 
-/// Returns what a port carries to an arm, with the contacts that the bench declares for it. For a port that is no command,
-/// the arm is "", which has no contacts.
+/// Refuses a port that carries no motion.
+fn is_motion(index: &Index<'_>, port: &str) -> Result<(), String> {
+    let nodes = Nodes::new(index, None);
+    let output = nodes.writer(port).and_then(|node| node.outputs.iter().find(|output| output.name == port));
+    let other = output.filter(|output| !["twist", "joints"].contains(&output.kind));
+    other.map_or(Ok(()), |output| {
+        Err(format!("`{port}` carries {}: name a port that carries a twist or joint velocities", output.kind))
+    })
+}
+
+/// Returns the role of the arm that a port moves; "" if it moves none.
+fn arm_behind<'a>(index: &Index<'a>, port: &str) -> &'a str {
+    let nodes = Nodes::new(index, None);
+    let writer = nodes.writer(port).map(|node| &*node.name);
+    let moves = |one: &Command<'_>| nodes.upstream(one.port).iter().any(|node| Some(&*node.name) == writer);
+    commands(index.outline()).find(moves).map_or("", |one| one.arm)
+}
+
+/// Returns what a port carries to an arm, with the contacts that the bench declares for it. A port that moves no arm, "",
+/// has no contacts.
 fn motion(compiled: &Compiled, index: &Index<'_>, of: String, command: Command<'_>) -> Result<Motion, String> {
     let Command { arm, port } = command;
     let (limits, twist) = chain(&Nodes::new(index, None), port)?;

@@ -39,7 +39,8 @@ impl Style {
         let line = |row: &[String; N]| format!("| {} |\n", row.join(" | "));
         let rule = format!("|{}\n", "---|".repeat(N));
         let (head, body) = rows.split_at(1);
-        head.iter().map(line).chain([rule]).chain(body.iter().map(line)).collect()
+        // Without an empty line, what follows would be a row.
+        head.iter().map(line).chain([rule]).chain(body.iter().map(line)).chain(["\n".to_owned()]).collect()
     }
 }
 
@@ -120,9 +121,14 @@ fn scheduled(feature: &Feature, schedule: &Schedule) -> String {
 fn rising(feature: &Feature) -> Option<String> {
     let (pid, rise) = (feature.pid.as_ref()?, feature.rise?);
     let (name, rise) = (&feature.name, number(rise));
+    let unit = match feature.quantity() {
+        Some("x" | "y") => "m/s2".to_owned(),
+        Some("orientation" | "angle") => "rad/s2".to_owned(),
+        _ => format!("per s2, in the unit of `{name}`"),
+    };
     Some(format!(
-        "`{pid}` lets the control of `{name}` grow by at most {rise} per s2, in the unit of `{name}`: a large error is \
-         reduced later than by kp alone.\n"
+        "`{pid}` lets the control of `{name}` grow by at most {rise} {unit}: a large error is reduced later than by kp \
+         alone.\n"
     ))
 }
 
@@ -196,8 +202,8 @@ fn loops(loops: &[Stability], style: &Style) -> String {
     if !known.is_empty() {
         text += "\n";
         text += &style.table(&[&[LOOP_HEAD.map(str::to_owned)], &known[..]].concat(), 2, 9);
-        text += "The peak is that of the sensitivity, and the noise is the deviation of the feature for one of the measurement. Without\n\
-                 limits, dry friction, hysteresis, and what one feature does to another.\n";
+        text += "The peak is that of the sensitivity. The noise is the standard deviation of the feature, as a multiple of that of its\n\
+                 measurement. Without limits, dry friction, hysteresis, and what one feature does to another.\n";
     }
     if loops.iter().any(|one| one.by_geometry && one.margins.is_some()) {
         let _ = writeln!(
@@ -247,7 +253,7 @@ fn margins(one: &Stability) -> Option<[String; 9]> {
         or_none(margins.gain_db, "dB", 1),
         stable(format!("{:.2}", margins.peak_sensitivity)),
         stable(margins.bandwidth()),
-        stable(or_none(Some(margins.ramp_lag_s * 1e3), "ms", 0)),
+        stable(margins.ramp_lag()),
         stable(format!("{:.3}", margins.noise)),
     ])
 }
