@@ -162,6 +162,8 @@ fn what_cannot_be_tuned_says_why() {
         ),
         (&["graphs/carry.toml"], "the part `left`, which has [inputs] and cannot run alone"),
         (&["graphs/finger_press.toml"], "a graph without modes has no mode to tune"),
+        (&["graphs/hybrid.toml", "--feature", "x", "--set", "nodes.pid.gains.x.kp=-3"], "of `x` is negative: make it"),
+        (&["graphs/force.toml", "--peak", "0.9"], "it must be more than 1, as 1.7 is"),
         (&["graphs/seek_ridge.toml"], "`x` is not measured: its modes can follow each other without a contact"),
     ] {
         let said = say(&[&["tune"], args].concat());
@@ -228,6 +230,17 @@ fn a_limit_that_acts_while_a_response_is_measured_is_named() {
     let said = say(&slow);
     assert!(said.out.contains("Over `ball`, `move.bumpless.bumpless` reduced the motion in "), "{}", said.out);
     assert!(!say(&slow[..2]).out.contains("reduced the motion"));
+}
+
+#[test]
+fn a_limit_that_hides_what_gains_can_do_is_named_beside_the_steps() {
+    let low = ["limits.peak_n=0.15", "limits.force_n=1.5"].into_iter().flat_map(|set| ["--set", set]);
+    let task = ["tune", "graphs/hybrid.toml", "--feature", "pressure"];
+    let said = say(&task.into_iter().chain(low).collect::<Vec<_>>());
+    assert_eq!(said.code, 1, "{}{}", said.out, said.err);
+    for text in ["`move.contact.force` reduced the motion in ", "raise it, or lower the setpoint"] {
+        assert!(said.out.contains(text), "{}", said.out);
+    }
 }
 
 /// Tunes `y` of `position`, which sticks on the ball, from a gain. Returns the gain that is proposed.

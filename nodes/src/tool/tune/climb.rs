@@ -4,6 +4,7 @@ use std::ops::RangeInclusive;
 
 use serde::Serialize;
 
+use super::limited::Limited;
 use super::step::{MAX_OVERSHOOT, MAX_REST, Step};
 
 /// Share of the gains of the graph with which it begins [1].
@@ -32,6 +33,8 @@ const FAILURES: usize = 4;
 /// Largest overshoot of gains that are good, in the mean over the steps [1]. A loop with a latency has it with a gain
 /// margin of 6 dB, and [`MAX_OVERSHOOT`] with 3 dB, so half of the gains that fail have 9 dB.
 pub(super) const GOOD_OVERSHOOT: f64 = 0.3;
+/// Ratio of two overshoots that are the same [1].
+const SAME_OVERSHOOT: f64 = 1.2;
 
 /// How a feature follows steps with some gains.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -44,6 +47,9 @@ pub(super) struct Rung {
     pub(super) steps: Vec<Vec<Step>>,
     /// Why no larger gains are tried, such as a mode that was left.
     pub(super) failure: Option<String>,
+    /// The limit that has acted most, over the contact where it has, if it has acted much.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(super) limited: Option<Limited>,
 }
 
 /// How a feature follows steps over one contact.
@@ -53,6 +59,8 @@ pub(super) struct Followed {
     pub(super) steps: Vec<Option<Step>>,
     /// Why the run has failed.
     pub(super) failure: Option<String>,
+    /// The limit that has acted much.
+    pub(super) limited: Option<Limited>,
 }
 
 impl Followed {
@@ -75,12 +83,15 @@ impl Rung {
             (Some(why), 2..) => Some(format!("over `{}`, {why}", contact.object)),
             (why, _) => why,
         };
-        Self { factor, gains, steps, failure: contacts.iter().find_map(over) }
+        let limited = contacts.iter().filter_map(|contact| contact.limited.clone());
+        let limited = limited.max_by(|a, b| a.share.total_cmp(&b.share));
+        Self { factor, gains, steps, failure: contacts.iter().find_map(over), limited }
     }
 
     /// Returns it beside those of other gains: it fails if the error is much larger than with smaller ones.
     pub(super) fn beside(self, climbed: &[Self]) -> Self {
-        let smaller = climbed.iter().filter(|other| other.factor < self.factor).filter_map(Self::error_s);
+        let smaller =
+            climbed.iter().filter(|other| other.factor < self.factor).filter_map(|other| other.error_s(climbed));
         let least = smaller.reduce(f64::min).unwrap_or(f64::INFINITY);
         let swings = self.worst(|step| step.error_s) > SWINGS * least;
         let why = || swings.then(|| "its error is more than twice that of smaller gains".to_owned());
@@ -93,19 +104,26 @@ impl Rung {
         self.steps.iter().map(mean).fold(0.0, f64::max)
     }
 
-    /// Returns whether smaller gains may be better: the feature swings, or they fail.
-    fn is_too_large(&self) -> bool {
-        self.failure.is_some() || self.worst(|step| step.overshoot) > GOOD_OVERSHOOT
+    /// Returns whether smaller gains may be better: the feature swings, or they fail. Friction can make a contact overshoot
+    /// with any gains: with smaller ones as much, and with a larger error.
+    fn is_too_large(&self, climbed: &[Self]) -> bool {
+        let [overshoot, error] = [self.worst(|step| step.overshoot), self.worst(|step| step.error_s)];
+        let is_alike = |other: &Self| {
+            let is_worse = other.worst(|step| step.error_s) > error;
+            is_worse && SAME_OVERSHOOT * other.worst(|step| step.overshoot) >= overshoot
+        };
+        let mut smaller = climbed.iter().filter(|other| other.failure.is_none() && other.factor < self.factor);
+        self.failure.is_some() || overshoot > GOOD_OVERSHOOT && !smaller.any(is_alike)
     }
 
-    fn is_good(&self) -> bool {
-        !self.is_too_large() && self.worst(|step| step.rest) <= MAX_REST
+    fn is_good(&self, climbed: &[Self]) -> bool {
+        !self.is_too_large(climbed) && self.worst(|step| step.rest) <= MAX_REST
     }
 
     /// Returns the error over the steps [s]; `None` if the gains are not good. If the feature does not settle, larger ones
     /// may be better.
-    fn error_s(&self) -> Option<f64> {
-        self.is_good().then(|| self.worst(|step| step.error_s))
+    fn error_s(&self, climbed: &[Self]) -> Option<f64> {
+        self.is_good(climbed).then(|| self.worst(|step| step.error_s))
     }
 }
 
@@ -134,12 +152,12 @@ fn further(climbed: &[Rung], most: f64) -> Option<f64> {
     let ([lowest, ..], Some(highest)) = (&sorted[..], sorted.last()) else {
         return (most >= RANGE[0]).then_some(FIRST.min(most));
     };
-    let least = |rungs: &[&Rung]| rungs.iter().filter_map(|rung| rung.error_s()).reduce(f64::min);
+    let least = |rungs: &[&Rung]| rungs.iter().filter_map(|rung| rung.error_s(climbed)).reduce(f64::min);
     let best = least(&sorted);
     let before = least(&sorted[..sorted.len().saturating_sub(PATIENCE)]);
     let brings_more = match before.zip(best) {
         Some((before, best)) => best < SMALLER * before,
-        None => best.is_some() || !highest.is_too_large(),
+        None => best.is_some() || !highest.is_too_large(climbed) || !lowest.is_too_large(climbed),
     };
     let larger = highest.factor * RATIO;
     if highest.failure.is_none() && brings_more && larger <= most.min(RANGE[1]) {
@@ -150,9 +168,10 @@ fn further(climbed: &[Rung], most: f64) -> Option<f64> {
     if climbed.len() == 1 && highest.failure.is_some() && most >= 1.0 {
         return Some(1.0);
     }
+    let failed = climbed.iter().filter(|rung| rung.failure.is_some()).count();
     let may_be_smaller = match self::best(climbed) {
         Some(best) => best.factor <= lowest.factor,
-        None => lowest.is_good() || lowest.is_too_large() && climbed.len() < FAILURES,
+        None => lowest.is_good(climbed) || lowest.is_too_large(climbed) && failed < FAILURES,
     };
     (may_be_smaller && smaller >= RANGE[0]).then_some(smaller)
 }
@@ -170,9 +189,9 @@ pub(super) fn best(climbed: &[Rung]) -> Option<&Rung> {
         let failed = climbed.iter().filter(|other| other.failure.is_some() && other.factor > rung.factor);
         failed.map(|other| other.factor).fold(f64::INFINITY, f64::min) > MARGIN * rung.factor
     };
-    let counted: Vec<&Rung> = climbed.iter().filter(|rung| rung.is_good() && is_far(rung)).collect();
-    let least = counted.iter().filter_map(|rung| rung.error_s()).reduce(f64::min)?;
-    let good = counted.into_iter().filter(|rung| rung.error_s().is_some_and(|error| error <= WORSE * least));
+    let counted: Vec<&Rung> = climbed.iter().filter(|rung| rung.is_good(climbed) && is_far(rung)).collect();
+    let least = counted.iter().filter_map(|rung| rung.error_s(climbed)).reduce(f64::min)?;
+    let good = counted.into_iter().filter(|rung| rung.error_s(climbed).is_some_and(|error| error <= WORSE * least));
     good.min_by(|a, b| a.factor.total_cmp(&b.factor))
 }
 
@@ -185,7 +204,7 @@ mod tests {
     }
 
     fn followed(step: Option<Step>) -> Followed {
-        Followed { object: "ball".to_owned(), steps: vec![step; 4], failure: None }
+        Followed { object: "ball".to_owned(), steps: vec![step; 4], failure: None, limited: None }
     }
 
     /// Climbs where the error over the steps, or that the gains fail, follows from the factor. Returns the factors in their
@@ -240,6 +259,19 @@ mod tests {
     }
 
     #[test]
+    fn an_overshoot_by_friction_is_the_same_with_smaller_gains_which_are_slower() {
+        // Small gains hardly move it.
+        let overshoot = |gain: f64| if gain > 1.8 { 0.65 } else { 0.36 * f64::from(u8::from(gain > 0.09)) };
+        let rest = |gain: f64| if gain < 0.09 { 0.5 } else { 0.1 };
+        let sticks = |gain: f64| Step { overshoot: overshoot(gain), rest: rest(gain), ..step(1.0 / gain) };
+        for first in [0.2, 0.25, 0.5, 2.0, 4.0] {
+            let (tried, best) = climb_by(RANGE[1], |factor| Some(sticks(first * factor)));
+            let best = first * best.unwrap_or_else(|| panic!("from {first}: {tried:?}"));
+            assert!((0.7..=1.05).contains(&best), "from {first}: {best}, of {tried:?}");
+        }
+    }
+
+    #[test]
     fn gains_beyond_the_margins_are_not_tried() {
         assert_eq!(climb(0.0, |_| Some(1.0)), (Vec::new(), None), "a motion the wrong way");
         for most in [0.3, 1.0, 1.4] {
@@ -274,7 +306,7 @@ mod tests {
         assert_eq!(rung.failure.as_deref(), Some("over `pen`, it overshoots by 70 %"));
         assert_eq!((rung.worst(|step| step.overshoot), rung.worst(|step| step.error_s)), (0.7, 2.0));
         let restless = Rung::new(1.0, [1.0; 3], &[followed(Some(Step { rest: 0.35, ..step(1.0) }))]);
-        assert_eq!((restless.failure.as_deref(), restless.error_s()), (None, None));
+        assert_eq!((restless.failure.as_deref(), restless.error_s(&[])), (None, None));
         let left = Followed { failure: Some("the task goes on to `press`".to_owned()), ..followed(Some(step(1.0))) };
         assert_eq!(Rung::new(1.0, [1.0; 3], &[left]).failure.as_deref(), Some("the task goes on to `press`"));
     }

@@ -39,6 +39,11 @@ impl<R> Course<R> {
         }
     }
 
+    /// Returns whether the first mode is over.
+    pub(super) const fn has_stepped(&self) -> bool {
+        self.at > 0
+    }
+
     /// Returns the rows of a mode.
     pub(super) fn rows(&self, mode: &str) -> &[R] {
         match self.modes.iter().position(|one| one == mode) {

@@ -85,7 +85,7 @@ pub(super) struct TuneArgs {
     #[arg(long = "feature", value_name = "NAME")]
     features: Vec<String>,
     /// Largest peak of the sensitivity
-    #[arg(long, value_name = "FACTOR", default_value_t = Wanted::default().peak)]
+    #[arg(long, value_name = "FACTOR", default_value_t = Wanted::default().peak, value_parser = peak)]
     peak: f64,
     /// Smallest gain margin [dB]
     #[arg(long, value_name = "DB", default_value_t = Wanted::default().gain_db)]
@@ -129,6 +129,7 @@ pub(super) fn run(args: TuneArgs, shell: &Shell) -> Result<u8, u8> {
     let request = args.graph_args.request(args.graph.clone());
     // Each run opens the devices by itself, and most devices can be open once.
     let compiled = compile(shell.catalogue(), &request).map_err(|report| shell.reject(&report))?;
+    compiled.warnings().iter().for_each(|report| shell.show(report));
     let outline = compiled.outline().clone();
     let ranges = Range::all(&Engine::new(compiled));
     let opened = ranges.iter().flat_map(Range::opened);
@@ -157,6 +158,12 @@ pub(super) fn run(args: TuneArgs, shell: &Shell) -> Result<u8, u8> {
         shell.say_beside(&format!("wrote {}", path.display()));
     }
     Ok(u8::from(!is_whole))
+}
+
+/// Reads the largest peak of the sensitivity, which no loop has below 1.
+fn peak(text: &str) -> Result<f64, String> {
+    let peak = text.parse().map_err(|error| format!("{error}"))?;
+    (peak > 1.0).then_some(peak).ok_or_else(|| "it must be more than 1, as 1.7 is".to_owned())
 }
 
 /// Checks before the long measurement that a picture can be written.

@@ -113,6 +113,16 @@ fn climbed(feature: &TunedFeature) -> String {
     let worst = if feature.answers.len() > 1 { "; each number is that of the worst contact" } else { "" };
     let mut text = format!("So gains are compared by steps of {size}{worst}:\n\n");
     text += &table(&rows, 0, 4);
+    // Of the smallest gains, because larger ones meet more limits.
+    let limited = feature.climbed.iter().filter(|rung| rung.failure.is_none() || feature.new.is_none());
+    let limited = limited.filter_map(|rung| Some((rung.gains[0], rung.limited.as_ref()?)));
+    if let Some((kp, Limited { limit, share })) = limited.min_by(|(a, _), (b, _)| a.total_cmp(b)) {
+        let (kp, share) = (to_three_digits(kp), 100.0 * share);
+        let _ = writeln!(
+            text,
+            "With kp = {kp}, `{limit}` reduced the motion in {share:.0} % of the ticks. A limit hides what gains can do."
+        );
+    }
     if climb::is_bounded(&feature.climbed, feature.most) {
         text += "Larger gains are beyond the margins of what is known of the loop.\n";
     }
@@ -137,6 +147,8 @@ fn why_none(feature: &TunedFeature) -> String {
     } else if feature.climbed.is_empty() {
         "its setpoint cannot step, because it is 0, comes from a node, or because a node reads the flag of the mode"
             .into()
+    } else if feature.climbed.iter().all(|rung| rung.limited.is_some()) {
+        "a limit reduces the motion with all of them: raise it, or lower the setpoint".into()
     } else {
         format!(
             "each is near one that fails, overshoots by more than {:.0} %, or has an error of more than {:.0} % at the end of \
@@ -167,7 +179,10 @@ fn gains(feature: &TunedFeature) -> String {
     let mut text = format!("\nkp {old_kp} becomes {kp}, ki {old_ki} becomes {ki}, kd {old_kd} becomes {kd}:\n{table}");
     if let Some(Bound { object, is_measured, margin }) = &feature.bound {
         let of = if *is_measured { "measured response" } else { "loop" };
-        let _ = writeln!(text, "With a tenth more, the {of} over `{object}` has {margin}, which is too little.");
+        let _ = writeln!(
+            text,
+            "With a tenth more, the {of} over `{object}` has {margin}: that is beyond the wanted margins."
+        );
     }
     for found in feature.answers.iter().filter(|found| found.refused.is_some()) {
         let _ = writeln!(text, "The margins over `{}` are not known.", found.object);
@@ -178,16 +193,19 @@ fn gains(feature: &TunedFeature) -> String {
 fn settled(tuned: &Tuned) -> String {
     let mut text = String::new();
     for one in &tuned.settled {
-        let error =
-            |held: &Held| held.error.map_or_else(|| "unknown".into(), |error| to_three_digits(error).to_string());
+        let feature = tuned.features.iter().find(|feature| feature.name == one.feature);
+        let sized = |error: f64| match feature {
+            Some(feature) => step::size(&feature.feature, error),
+            None => to_three_digits(error).to_string(),
+        };
+        let error = |held: &Held| held.error.map_or_else(|| "unknown".into(), sized);
         let (old, new) = (error(&one.old), error(&one.new));
         let _ = write!(
             text,
             "Over `{}`, the error of `{}` is {old} with the old gains and {new} with the new ones (rms)",
             one.object, one.feature
         );
-        let feature = tuned.features.iter().find(|feature| feature.name == one.feature);
-        // One step over a contact that sticks is chance: the table has the mean of four.
+        // One step over a contact that sticks is chance: the table has the mean of eight.
         let feature = feature.filter(|feature| feature.climbed.is_empty());
         if let Some(((old, new), feature)) = one.old.step.zip(one.new.step).zip(feature) {
             let (size, old, new) = (step::size(&feature.feature, new.size), followed(&old), followed(&new));

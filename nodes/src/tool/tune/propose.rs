@@ -13,7 +13,7 @@ use super::climb::{self, Followed, Rung};
 use super::experiment::{Experiment, HALF};
 use super::identify::{Identified, answer, identify, known, quantity};
 use super::step::{Planned, STEPS};
-use super::trial::Trial;
+use super::trial::{Run, Trial};
 use crate::motion::COMPONENTS;
 use crate::tool::control::choose::{Wanted, bound, factor};
 use crate::tool::control::contacts::Contact;
@@ -179,8 +179,8 @@ impl Measurement<'_> {
             let gains = found.near(factor);
             self.shell.say_beside(&format!("`{}`: steps with kp = {}", found.name, gains[0]));
             let followed = trials.iter().zip(&steps).zip(&found.answers).map(|((trial, steps), answer)| {
-                let (steps, failure) = trial.to_and_fro(&found.feature, steps, gains)?;
-                Ok(Followed { object: answer.object.clone(), steps, failure })
+                let Run { each: steps, failure, limited } = trial.to_and_fro(&found.feature, steps, gains)?;
+                Ok(Followed { object: answer.object.clone(), steps, failure, limited })
             });
             let followed = followed.collect::<Result<Vec<Followed>, Stop>>()?;
             found.climbed.push(Rung::new(factor, gains, &followed).beside(&found.climbed));

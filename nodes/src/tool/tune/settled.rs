@@ -4,7 +4,7 @@ use serde::Serialize;
 
 use super::propose::TunedFeature;
 use super::step::{self, Planned, Step};
-use super::trial::{Seen, Trial};
+use super::trial::{Run, Seen, Trial};
 use super::{Stop, gain_keys};
 use crate::tool::control::law::Feature;
 
@@ -68,7 +68,7 @@ pub(super) fn compare(trial: &Trial<'_>, features: &[TunedFeature], object: &str
     let features: Vec<&Feature> = changed.iter().map(|one| &one.feature).collect();
     let steps = step::plan(trial.outline, trial.mode, &features);
     let held = |gains: &[String]| -> Result<(Vec<Held>, Option<String>), Stop> {
-        let (seen, failure) = trial.follow(&features, &steps, gains)?;
+        let Run { each: seen, failure, .. } = trial.follow(&features, &steps, gains)?;
         let each = seen.iter().zip(&steps).map(|(seen, step)| Held::of(seen, *step, trial.outline.period_s));
         Ok((each.collect(), failure))
     };

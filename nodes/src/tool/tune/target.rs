@@ -36,6 +36,15 @@ pub(super) fn controlled<'o>(
     };
     let features = moving(mode);
     let known: Vec<String> = features.iter().map(|feature| format!("`{}`", feature.name)).collect();
+    let reversed = |name: &&String| {
+        let law = law(&Nodes::new(index, Some(mode)), twist);
+        law.features.iter().any(|feature| feature.name == **name && feature.moves() && feature.kp < 0.0)
+    };
+    if let Some(name) = args.features.iter().find(reversed) {
+        return Err(format!(
+            "the gain `kp` of `{name}` is negative: make it positive, and turn the sign of its column"
+        ));
+    }
     if let Some(unknown) = args.features.iter().find(|name| features.iter().all(|feature| feature.name != **name)) {
         return Err(format!("the mode `{}` does not control `{unknown}`; it controls {}", mode.name, known.join(", ")));
     }

@@ -8,6 +8,7 @@ use tactflow_runtime::record::PortColumns;
 
 use super::cases::Case;
 use super::course::Course;
+use super::limited::{Limited, Watch};
 use super::step::{self, Planned, STEPS, Step};
 use super::{Stop, gain_keys, lift, signal};
 use crate::tool::control::law::Feature;
@@ -43,11 +44,11 @@ impl<'a> Trial<'a> {
         feature: &Feature,
         steps: &[Planned; STEPS],
         gains: [f64; 3],
-    ) -> Result<(Vec<Option<Step>>, Option<String>), Stop> {
+    ) -> Result<Run<Option<Step>>, Stop> {
         let gains = gain_keys::gains(feature, self.mode, gains);
-        let (seen, failure) = self.follow(&[feature; STEPS], &steps.map(Some), &gains)?;
+        let Run { each: seen, failure, limited } = self.follow(&[feature; STEPS], &steps.map(Some), &gains)?;
         let each = seen.iter().zip(steps).map(|(seen, step)| Step::of(step.size, &seen.after, self.outline.period_s));
-        Ok((each.collect(), failure))
+        Ok(Run { each: each.collect(), failure, limited })
     }
 
     /// Runs the task with some gains through steps of its features. Returns what each feature did, and why the run has failed.
@@ -56,7 +57,7 @@ impl<'a> Trial<'a> {
         features: &[&Feature],
         steps: &[Option<Planned>],
         gains: &[String],
-    ) -> Result<(Vec<Seen>, Option<String>), Stop> {
+    ) -> Result<Run<Seen>, Stop> {
         let set = [&self.request.set[..], gains, &step::settings(self.mode, features, steps)].concat();
         let request = Request { set, ..self.request.clone() };
         let compiled = compile(self.catalogue, &request).map_err(|report| report.render(false))?;
@@ -68,10 +69,14 @@ impl<'a> Trial<'a> {
         });
         let ports: Vec<ScalarId> = ports.collect::<Result<_, _>>()?;
         let settling = signal::settling(period);
+        let mut limits = Watch::new(&engine);
         let mut course = Course::new(step::modes(self.mode, steps), settling);
         let options = RunOptions { duration: Some(signal::duration(period)), ..RunOptions::default() };
         let outcome = run(&mut engine, &options, &mut |engine| {
             let read = |port: &ScalarId| engine.bus().scalar(*port).unwrap_or(f64::NAN);
+            if course.has_stepped() {
+                limits.see(engine);
+            }
             course.see(engine.mode(), || ports.iter().map(read).collect());
         });
         let outcome = outcome.map_err(|error| format!("the run cannot start: {error}"))?;
@@ -91,8 +96,18 @@ impl<'a> Trial<'a> {
                 after: column(course.rows(&step::mode_name(i))),
             }
         });
-        Ok((seen.collect(), failure))
+        Ok(Run { each: seen.collect(), failure, limited: limits.most() })
     }
+}
+
+/// What one run of a trial has shown.
+pub(super) struct Run<T> {
+    /// For each step.
+    pub(super) each: Vec<T>,
+    /// Why the run has failed.
+    pub(super) failure: Option<String>,
+    /// The limit that has acted much since the first step.
+    pub(super) limited: Option<Limited>,
 }
 
 /// The errors of a feature in one run.
