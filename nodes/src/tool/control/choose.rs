@@ -25,14 +25,9 @@ impl Default for Wanted {
 impl Wanted {
     /// Returns whether a loop keeps them.
     pub(crate) fn holds(self, found: &Margins) -> bool {
-        found.is_stable
-            && found.peak_sensitivity <= self.peak
-            && found.gain_db.is_none_or(|db| db >= self.gain_db)
-            && found.phase_deg.is_none_or(|deg| deg >= self.phase_deg)
+        self.broken(found).is_none()
     }
-}
 
-impl Wanted {
     /// Returns what a loop does not keep, for a sentence; `None` if it keeps all.
     fn broken(self, found: &Margins) -> Option<String> {
         let gain = found.gain_db.filter(|db| *db < self.gain_db).map(|db| format!("a gain margin of {db:.1} dB"));
@@ -49,7 +44,10 @@ impl Wanted {
 /// for a sentence.
 pub(crate) fn bound(loops: &[Loop], wanted: Wanted) -> Option<(usize, String)> {
     let broken = |around: &Loop| wanted.broken(&margins(&around.times(STEP)));
-    loops.iter().enumerate().find_map(|(i, around)| Some((i, broken(around)?)))
+    let bounds = loops.iter().enumerate().filter_map(|(i, around)| Some((i, around, broken(around)?)));
+    let most = |around: &Loop| factor(std::slice::from_ref(around), wanted).unwrap_or_default();
+    let (which, _, margin) = bounds.min_by(|(_, a, _), (_, b, _)| most(a).total_cmp(&most(b)))?;
+    Some((which, margin))
 }
 
 /// Ratio of two neighbouring gains that are tried, before the last ones are halved.

@@ -18,7 +18,8 @@ const FURTHER: f64 = 1.3;
 const MAX_CHANGE: f64 = 0.5;
 /// The component that presses, and lifts off.
 const PRESSES: usize = 2;
-/// Motions that count where no larger ones do, as a share of one that lifts the pad off [1].
+/// Motions that count where no larger ones do, as a share of one that lifts the pad off [1]. Two must be left to compare,
+/// so this is the last motion.
 pub(super) const NEAR: f64 = 0.25;
 
 /// What the motions of all amplitudes say.
@@ -60,7 +61,7 @@ pub(super) fn agreed(
     shell: &Shell,
 ) -> Result<Result<Response, Refusal>, Stop> {
     let (mut runs, mut limited): (Vec<Vec<Line>>, Vec<Option<Limited>>) = (Vec::new(), Vec::new());
-    let mut stopped = None;
+    let (mut stopped, mut is_absent) = (None, false);
     let unit = if component < 3 { "m" } else { "rad" };
     let amplitudes = AMPLITUDES[component / 3];
     for amplitude in amplitudes {
@@ -70,7 +71,8 @@ pub(super) fn agreed(
                 runs.push(lines);
                 limited.push(limit);
             }
-            Answered::Nothing(reason) => {
+            Answered::Nothing(reason, absent) => {
+                is_absent = absent;
                 stopped = Some(format!("with a test signal of {amplitude} {unit}, {reason}"));
                 break;
             }
@@ -88,7 +90,7 @@ pub(super) fn agreed(
         return Ok(Ok(Response { lines, growth, limited: limited[last].take(), lifts_off: None }));
     }
     // A light contact is not linear where a motion nearly lifts the pad off.
-    let lifts_off = stopped.as_ref().map(|_| amplitudes[runs.len()]).filter(|_| component == PRESSES);
+    let lifts_off = stopped.as_ref().map(|_| amplitudes[runs.len()]).filter(|_| component == PRESSES && is_absent);
     let near = |amplitude: &&f64| lifts_off.is_some_and(|lifts_off| **amplitude <= NEAR * lifts_off);
     if let Some((lines, growth, last)) = largest(&runs[..amplitudes.iter().take_while(near).count()]) {
         return Ok(Ok(Response { lines, growth, limited: limited[last].take(), lifts_off }));

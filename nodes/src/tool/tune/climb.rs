@@ -28,7 +28,7 @@ const MARGIN: f64 = 0.99 * RATIO * RATIO * RATIO;
 /// Error over the steps, as a multiple of that of smaller gains, from which on gains fail: the feature swings [1]. A loop
 /// with a latency has it with a gain margin of 2 dB, and the smallest error with 9 dB.
 const SWINGS: f64 = 2.0;
-/// Number of gains that may fail one after the other, from the first ones on.
+/// Number of gains that may fail before one is good.
 const FAILURES: usize = 4;
 /// Largest overshoot of gains that are good, in the mean over the steps [1]. A loop with a latency has it with a gain
 /// margin of 6 dB, and [`MAX_OVERSHOOT`] with 3 dB, so half of the gains that fail have 9 dB.
@@ -105,14 +105,15 @@ impl Rung {
     }
 
     /// Returns whether smaller gains may be better: the feature swings, or they fail. Friction can make a contact overshoot
-    /// with any gains: with smaller ones as much, and with a larger error.
+    /// with any gains: with half of them as much, and with a larger error.
     fn is_too_large(&self, climbed: &[Self]) -> bool {
         let [overshoot, error] = [self.worst(|step| step.overshoot), self.worst(|step| step.error_s)];
         let is_alike = |other: &Self| {
             let is_worse = other.worst(|step| step.error_s) > error;
             is_worse && SAME_OVERSHOOT * other.worst(|step| step.overshoot) >= overshoot
         };
-        let mut smaller = climbed.iter().filter(|other| other.failure.is_none() && other.factor < self.factor);
+        let mut smaller =
+            climbed.iter().filter(|other| other.failure.is_none() && MARGIN * other.factor <= self.factor);
         self.failure.is_some() || overshoot > GOOD_OVERSHOOT && !smaller.any(is_alike)
     }
 
@@ -130,7 +131,7 @@ impl Rung {
 /// Returns the gains to try next, as a multiple of those of the graph; `None` after enough of them.
 ///
 /// They grow until they bring no more, until they fail, or up to the largest multiple `most`. They become smaller while the
-/// smallest ones are the best, or if the first ones and those of the graph fail. Then those beside the best ones are tried.
+/// smallest ones are the best, or while all are too large. Then those beside the best ones are tried.
 /// `climbed` are those that were tried, in this order.
 pub(super) fn next(climbed: &[Rung], most: f64) -> Option<f64> {
     further(climbed, most).or_else(|| beside(climbed))

@@ -44,8 +44,8 @@ pub(super) const HALF: f64 = 0.5;
 pub(super) enum Answered {
     /// The lines of the spectrum, and the limit that has acted much.
     Lines(Vec<Line>, Option<Limited>),
-    /// Why there are none, such as a mode that was left.
-    Nothing(String),
+    /// Why there are none, such as a mode that was left, and whether the feature was absent.
+    Nothing(String, bool),
     /// Why the task has not reached the mode.
     NotReached(String),
     /// Somebody interrupted it.
@@ -85,20 +85,22 @@ impl Experiment<'_> {
         });
         let outcome = outcome.map_err(|error| format!("the run cannot start: {error}"))?;
         let (rows, left) = (stay.rows(), stay.left());
+        let mut values = rows.iter().skip(sines[0].begin).flatten();
+        let is_absent = values.any(|value| !value.is_finite());
         Ok(match (&outcome.end, left) {
             (End::Interrupted, _) => Answered::Interrupted,
             (end, _) if rows.is_empty() => {
                 Answered::NotReached(format!("the task does not reach the mode `{}`: {end}", self.mode.name))
             }
-            (End::Fault(fault), _) => Answered::Nothing(fault.to_string()),
-            (_, Some(mode)) => Answered::Nothing(format!("the mode `{}` was left for `{mode}`", self.mode.name)),
+            (End::Fault(fault), _) => Answered::Nothing(fault.to_string(), is_absent),
+            (_, Some(mode)) => {
+                Answered::Nothing(format!("the mode `{}` was left for `{mode}`", self.mode.name), is_absent)
+            }
             _ if rows.len() < wanted => {
                 let seconds = rows.len() as f64 * self.period;
-                Answered::Nothing(format!("the mode `{}` lasted {seconds:.1} s only", self.mode.name))
+                Answered::Nothing(format!("the mode `{}` lasted {seconds:.1} s only", self.mode.name), is_absent)
             }
-            _ if rows[sines[0].begin..].iter().flatten().any(|value| !value.is_finite()) => {
-                Answered::Nothing(format!("`{}` was absent for a while", self.feature.name))
-            }
+            _ if is_absent => Answered::Nothing(format!("`{}` was absent for a while", self.feature.name), is_absent),
             _ => Answered::Lines(sines.iter().map(|sine| self.line(rows, sine)).collect(), limits.most()),
         })
     }

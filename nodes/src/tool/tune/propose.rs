@@ -173,6 +173,7 @@ impl Measurement<'_> {
         let steps: Option<Vec<[Planned; STEPS]>> = trials.iter().map(|trial| trial.steps(&found.feature)).collect();
         let Some(steps) = steps else {
             found.set(None);
+            found.bound = None;
             return Ok(found);
         };
         while let Some(factor) = climb::next(&found.climbed, found.most) {
@@ -230,20 +231,20 @@ fn propose(feature: Feature, answers: Vec<Identified>, contacts: &[Contact], wan
         _ => None,
     };
     let measured: Vec<(usize, Loop)> = loops.iter().filter_map(measured).collect();
-    let all = || measured.iter().chain(&loops);
-    let each: Vec<Loop> = all().map(|(_, one)| one.clone()).collect();
+    let each: Vec<Loop> = measured.iter().chain(&loops).map(|(_, one)| one.clone()).collect();
     let known = factor(&each, wanted);
     let factor = known.filter(|_| loops.len() == contacts.len() && answers.iter().all(|found| found.refused.is_none()));
-    let bound = factor.and_then(|factor| {
-        let scaled: Vec<Loop> = each.iter().map(|around| around.times(factor)).collect();
-        let (which, margin) = bound(&scaled, wanted)?;
-        let (contact, _) = all().nth(which)?;
-        Some(Bound { object: answers[*contact].object.clone(), is_measured: which < measured.len(), margin })
-    });
     let (name, climbed, margins) = (feature.name.clone(), Vec::new(), Vec::new());
     let most = if each.is_empty() { f64::INFINITY } else { known.unwrap_or_default() };
-    let mut found = TunedFeature { name, answers, old, new: None, margins, bound, climbed, most, feature, loops };
+    let mut found = TunedFeature { name, answers, old, new: None, margins, bound: None, climbed, most, feature, loops };
     // Rounded down, so that the margins hold.
-    found.set(factor.map(|factor| found.times(factor, down_to_two_digits)));
+    let new = factor.map(|factor| found.times(factor, down_to_two_digits));
+    found.bound = new.and_then(|new| {
+        let scaled: Vec<Loop> = each.iter().map(|around| around.times(new[0] / old[0])).collect();
+        let (which, margin) = bound(&scaled, wanted)?;
+        let contact = measured.iter().chain(&found.loops).nth(which)?.0;
+        Some(Bound { object: found.answers[contact].object.clone(), is_measured: which < measured.len(), margin })
+    });
+    found.set(new);
     found
 }

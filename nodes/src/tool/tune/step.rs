@@ -123,9 +123,9 @@ pub(super) fn plan(outline: &Outline, mode: &OutlinedMode, features: &[&Feature]
         let (size, may_be_less) = match feature.quantity()? {
             "x" | "y" => (extent(&nodes, feature).map_or(PLACE, |extent| PLACE.min(PLACE_SHARE * extent)), true),
             "orientation" | "angle" => (ANGLE, true),
-            _ => (SHARE * setpoint.abs(), false),
+            _ => (SHARE * setpoint, false),
         };
-        (size > 0.0).then_some(Planned { setpoint, size, may_be_less })
+        (size != 0.0).then_some(Planned { setpoint, size, may_be_less })
     };
     features.iter().map(one).collect()
 }

@@ -33,12 +33,12 @@ impl<'a> Trial<'a> {
         Self { catalogue, request, outline, mode }
     }
 
-    /// Returns the steps of a feature up and down; `None` if its setpoint has none.
+    /// Returns the steps of a feature to and fro; `None` if its setpoint has none.
     pub(super) fn steps(&self, feature: &Feature) -> Option<[Planned; STEPS]> {
         step::plan(self.outline, self.mode, &[feature])[0].map(step::to_and_fro)
     }
 
-    /// Returns how a feature follows steps with some gains, as far as it is known, and why the run has failed.
+    /// Returns how a feature follows steps with some gains, as far as it is known.
     pub(super) fn to_and_fro(
         &self,
         feature: &Feature,
@@ -51,7 +51,7 @@ impl<'a> Trial<'a> {
         Ok(Run { each: each.collect(), failure, limited })
     }
 
-    /// Runs the task with some gains through steps of its features. Returns what each feature did, and why the run has failed.
+    /// Runs the task with some gains through steps of its features. Returns what each feature did.
     pub(super) fn follow(
         &self,
         features: &[&Feature],
