@@ -134,6 +134,15 @@ impl Feature {
         self.measured.as_ref()?.rsplit('.').next()
     }
 
+    /// Returns the unit of a place or an angle; `None` for any other quantity.
+    pub(crate) fn unit(&self) -> Option<&'static str> {
+        match self.quantity()? {
+            "x" | "y" => Some("m"),
+            "orientation" | "angle" => Some("rad"),
+            _ => None,
+        }
+    }
+
     /// Returns the node that turns its control into a twist, and its name there.
     pub(crate) fn id(&self) -> (&str, &str) {
         (&self.jacobian, &self.name)

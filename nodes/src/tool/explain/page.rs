@@ -121,11 +121,7 @@ fn scheduled(feature: &Feature, schedule: &Schedule) -> String {
 fn rising(feature: &Feature) -> Option<String> {
     let (pid, rise) = (feature.pid.as_ref()?, feature.rise?);
     let (name, rise) = (&feature.name, number(rise));
-    let unit = match feature.quantity() {
-        Some("x" | "y") => "m/s2".to_owned(),
-        Some("orientation" | "angle") => "rad/s2".to_owned(),
-        _ => format!("per s2, in the unit of `{name}`"),
-    };
+    let unit = feature.unit().map_or_else(|| format!("per s2, in the unit of `{name}`"), |unit| format!("{unit}/s2"));
     Some(format!(
         "`{pid}` lets the control of `{name}` grow by at most {rise} {unit}: a large error is reduced later than by kp \
          alone.\n"

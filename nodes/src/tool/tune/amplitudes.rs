@@ -71,9 +71,9 @@ pub(super) fn agreed(
                 runs.push(lines);
                 limited.push(limit);
             }
-            Answered::Nothing(reason, absent) => {
+            Answered::Nothing { why, is_absent: absent } => {
                 is_absent = absent;
-                stopped = Some(format!("with a test signal of {amplitude} {unit}, {reason}"));
+                stopped = Some(format!("with a test signal of {amplitude} {unit}, {why}"));
                 break;
             }
             Answered::NotReached(why) if runs.is_empty() => {

@@ -45,7 +45,7 @@ pub(super) enum Answered {
     /// The lines of the spectrum, and the limit that has acted much.
     Lines(Vec<Line>, Option<Limited>),
     /// Why there are none, such as a mode that was left, and whether the feature was absent.
-    Nothing(String, bool),
+    Nothing { why: String, is_absent: bool },
     /// Why the task has not reached the mode.
     NotReached(String),
     /// Somebody interrupted it.
@@ -87,20 +87,19 @@ impl Experiment<'_> {
         let (rows, left) = (stay.rows(), stay.left());
         let mut values = rows.iter().skip(sines[0].begin).flatten();
         let is_absent = values.any(|value| !value.is_finite());
+        let nothing = |why: String| Answered::Nothing { why, is_absent };
         Ok(match (&outcome.end, left) {
             (End::Interrupted, _) => Answered::Interrupted,
             (end, _) if rows.is_empty() => {
                 Answered::NotReached(format!("the task does not reach the mode `{}`: {end}", self.mode.name))
             }
-            (End::Fault(fault), _) => Answered::Nothing(fault.to_string(), is_absent),
-            (_, Some(mode)) => {
-                Answered::Nothing(format!("the mode `{}` was left for `{mode}`", self.mode.name), is_absent)
-            }
+            (End::Fault(fault), _) => nothing(fault.to_string()),
+            (_, Some(mode)) => nothing(format!("the mode `{}` was left for `{mode}`", self.mode.name)),
             _ if rows.len() < wanted => {
                 let seconds = rows.len() as f64 * self.period;
-                Answered::Nothing(format!("the mode `{}` lasted {seconds:.1} s only", self.mode.name), is_absent)
+                nothing(format!("the mode `{}` lasted {seconds:.1} s only", self.mode.name))
             }
-            _ if is_absent => Answered::Nothing(format!("`{}` was absent for a while", self.feature.name), is_absent),
+            _ if is_absent => nothing(format!("`{}` was absent for a while", self.feature.name)),
             _ => Answered::Lines(sines.iter().map(|sine| self.line(rows, sine)).collect(), limits.most()),
         })
     }

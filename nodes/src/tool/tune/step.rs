@@ -120,10 +120,11 @@ pub(super) fn plan(outline: &Outline, mode: &OutlinedMode, features: &[&Feature]
     let one = |feature: &&Feature| {
         let compared = feature.compared.as_deref().filter(|_| !reads_mode)?;
         let setpoint = setpoint(&nodes, compared, &feature.name)?;
-        let (size, may_be_less) = match feature.quantity()? {
-            "x" | "y" => (extent(&nodes, feature).map_or(PLACE, |extent| PLACE.min(PLACE_SHARE * extent)), true),
-            "orientation" | "angle" => (ANGLE, true),
-            _ => (SHARE * setpoint, false),
+        feature.quantity()?;
+        let (size, may_be_less) = match feature.unit() {
+            Some("m") => (extent(&nodes, feature).map_or(PLACE, |extent| PLACE.min(PLACE_SHARE * extent)), true),
+            Some(_) => (ANGLE, true),
+            None => (SHARE * setpoint, false),
         };
         (size != 0.0).then_some(Planned { setpoint, size, may_be_less })
     };
@@ -140,17 +141,12 @@ fn extent(nodes: &Nodes<'_>, feature: &Feature) -> Option<f64> {
 /// Returns the size of a step of a feature with its unit, where the unit is known.
 pub(super) fn size(feature: &Feature, size: f64) -> String {
     let size = to_three_digits(size.abs());
-    match feature.quantity() {
-        Some("x" | "y") => format!("{size} m"),
-        Some("orientation" | "angle") => format!("{size} rad"),
-        _ => size.to_string(),
-    }
+    feature.unit().map_or_else(|| size.to_string(), |unit| format!("{size} {unit}"))
 }
 
 /// Returns the size of the steps of a feature, for a sentence: as a share where its unit is not known.
 pub(super) fn heading(feature: &Feature, size: Option<f64>) -> String {
-    let has_unit = matches!(feature.quantity(), Some("x" | "y" | "orientation" | "angle"));
-    let size = size.filter(|_| has_unit).map(|size| self::size(feature, size));
+    let size = size.filter(|_| feature.unit().is_some()).map(|size| self::size(feature, size));
     size.unwrap_or_else(|| format!("{:.0} % of the setpoint", 100.0 * SHARE))
 }
 

@@ -19,10 +19,12 @@ pub(super) fn controlled<'o>(
     if !task.is_empty() {
         return Err(part(index.outline(), task, arm));
     }
-    let moving = |mode: &OutlinedMode| {
+    let controlled = |mode: &OutlinedMode| {
         let law = law(&Nodes::new(index, Some(mode)), twist);
-        law.features.into_iter().filter(|feature| feature.moves() && feature.kp > 0.0).collect::<Vec<_>>()
+        law.features.into_iter().filter(Feature::moves).collect::<Vec<_>>()
     };
+    let moving =
+        |mode: &OutlinedMode| controlled(mode).into_iter().filter(|feature| feature.kp > 0.0).collect::<Vec<_>>();
     let modes: Vec<&OutlinedMode> = index.modes(task).into_iter().flatten().collect();
     let mode = match &args.mode {
         Some(name) => modes.iter().find(|mode| mode.name == *name).ok_or_else(|| {
@@ -36,11 +38,8 @@ pub(super) fn controlled<'o>(
     };
     let features = moving(mode);
     let known: Vec<String> = features.iter().map(|feature| format!("`{}`", feature.name)).collect();
-    let reversed = |name: &&String| {
-        let law = law(&Nodes::new(index, Some(mode)), twist);
-        law.features.iter().any(|feature| feature.name == **name && feature.moves() && feature.kp < 0.0)
-    };
-    if let Some(name) = args.features.iter().find(reversed) {
+    let is_reversed = |feature: &Feature| feature.kp < 0.0 && args.features.contains(&feature.name);
+    if let Some(Feature { name, .. }) = controlled(mode).into_iter().find(is_reversed) {
         return Err(format!(
             "the gain `kp` of `{name}` is negative: make it positive, and turn the sign of its column"
         ));
