@@ -1,5 +1,5 @@
-//! `explain` against what a run measures: the lag behind a ramp, the bandwidth of a step, the stopping distance and the
-//! impact force of a touch.
+//! `explain` against what a run measures: the lag behind a ramp, the bandwidth of a step, the gain at which a loop
+//! oscillates, the stopping distance and the impact force of a touch.
 
 use std::collections::BTreeMap;
 use std::f64::consts::{FRAC_PI_2, TAU};
@@ -77,6 +77,41 @@ fn a_filter_does_not_change_the_lag_behind_an_edge_that_turns_and_an_integral_ta
         let errors: Vec<f64> = errors.collect();
         let ran = errors.iter().sum::<f64>().abs() / errors.len() as f64;
         assert!((ran - left * lag).abs() < 0.2 * lag, "{ran} s, explained {lag} s, of which {left} is left");
+    }
+}
+
+/// The error of the pressure in a run, from 10 s on, without its mean (rms).
+fn swing(args: &[&str], [kp, ki]: [f64; 2]) -> f64 {
+    let gains = [format!("kp={kp:?}"), format!("ki={ki:?}")].map(|gain| format!("nodes.pid.gains.pressure.{gain}"));
+    let rows = recorded(&[args, &["--set", &gains[0], "--set", &gains[1]]].concat(), "16s");
+    let late = rows.iter().filter(|row| row["time"] > 10.0);
+    let errors: Vec<f64> = late.filter_map(|row| row.get("error.error.pressure").copied()).collect();
+    let number = errors.len() as f64;
+    let mean = errors.iter().sum::<f64>() / number;
+    (errors.iter().map(|error| (error - mean).powi(2)).sum::<f64>() / number).sqrt()
+}
+
+#[test]
+fn a_loop_oscillates_by_itself_from_its_gain_margin_on() {
+    let alone = ["--set", "nodes.schedule.min=1.0", "--set", "nodes.schedule.max=1.0"];
+    for (task, bench, set, gains) in [
+        ("force", "pen", &alone[..], [0.5, 0.08]),
+        ("force", "toy_box", &alone[..], [0.5, 0.08]),
+        ("edge", "edge", &[][..], [0.4, 0.08]),
+    ] {
+        let (graph, bench) = (format!("graphs/{task}.toml"), format!("graphs/benches/{bench}.toml"));
+        let args = [&[&*graph, "--bench", &*bench], set].concat();
+        let page = explained(&args);
+        let modes = page["motions"][0]["modes"].as_array().unwrap();
+        let mut loops = modes.iter().flat_map(|mode| mode["loops"].as_array().unwrap());
+        let pressure = loops.find(|one| one["feature"] == "pressure").unwrap();
+        let margin = pressure["margins"]["gain_db"].as_f64().unwrap();
+        let with = |db: f64| swing(&args, gains.map(|gain| gain * 10_f64.powf(db / 20.0)));
+        let (still, below, beyond) = (with(0.0), with(margin - 2.5), with(margin + 2.5));
+        assert!(
+            below < 2.0 * still && beyond > 4.0 * still,
+            "{task}, {bench}, {margin} dB: {still}, {below}, {beyond}"
+        );
     }
 }
 
@@ -233,7 +268,7 @@ fn the_stopping_distance_bounds_that_of_a_run_and_the_impact_bounds_its_force() 
     // Two periods of 4 ms, 14.8 ms of latency along x, and 2 m/s².
     assert!((distance - (0.015 * 0.0228 + 0.015 * 0.015 / 4.0)).abs() < 1e-12, "{distance}");
     let impact = reach["impacts"][0]["force_n"].as_f64().unwrap();
-    assert!((impact - 0.015 * 10_000.0 / (TAU * 7.76)).abs() < 1e-9, "{impact}");
+    assert!((impact - 0.015 * 10_000.0 / (TAU * 7.46)).abs() < 1e-9, "{impact}");
     let search = approach(&args, "servo", "move.lost");
     assert_eq!(search["speed_m_per_s"], 0.005);
     // A motion away from the object, or along it, has no impact.

@@ -204,7 +204,7 @@ fn a_contact_that_stiffens_counts_with_the_largest_motion() {
 
 #[test]
 fn a_loop_that_loses_its_contact_is_measured_again_with_smaller_gains() {
-    let swings = "devices.bench.damping_ratio=0.1";
+    let swings = "devices.bench.damping_ratio=0.085";
     let said = say(&["tune", "graphs/position.toml", "--feature", "x", "--format", "json", "--set", swings]);
     assert_eq!(said.code, 0, "{}{}", said.out, said.err);
     assert!(said.err.contains("`x`: again, with an eighth of its gains"), "{}", said.err);
@@ -226,9 +226,9 @@ fn a_task_that_does_not_reach_the_mode_is_run_once_and_says_why() {
 
 #[test]
 fn a_limit_that_acts_while_a_response_is_measured_is_named() {
-    let slow = ["tune", "graphs/force.toml", "--set", "limits.linear_m_per_s=0.004"];
+    let slow = ["tune", "graphs/force.toml", "--set", "limits.peak_n=0.27"];
     let said = say(&slow);
-    assert!(said.out.contains("Over `ball`, `move.bumpless.bumpless` reduced the motion in "), "{}", said.out);
+    assert!(said.out.contains("Over `ball`, `move.contact.peak` reduced the motion in "), "{}", said.out);
     assert!(!say(&slow[..2]).out.contains("reduced the motion"));
 }
 

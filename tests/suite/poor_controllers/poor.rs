@@ -340,7 +340,11 @@ pub(super) fn poor_sums() -> Vec<(&'static str, Variant)> {
             "low-margin",
             variant(
                 "edge",
-                &["set nodes.sum.in.twice=\"projector.twist\"", "set nodes.sum.in.thrice=\"projector.twist\""],
+                &[
+                    "gains.pressure = { kp = 0.2 }",
+                    "set nodes.sum.in.twice=\"projector.twist\"",
+                    "set nodes.sum.in.thrice=\"projector.twist\"",
+                ],
             ),
         ),
         ("low-margin", rolled("gains.x = { kp = 30.0 }")),

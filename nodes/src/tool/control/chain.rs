@@ -38,3 +38,9 @@ pub(crate) fn chain(nodes: &Nodes<'_>, port: &str) -> Result<(Vec<Limiter>, Stri
     limits.reverse();
     Ok((limits, port))
 }
+
+/// Returns the smallest value that the limiters have for a parameter.
+pub(crate) fn smallest(nodes: &Nodes<'_>, limits: &[Limiter], key: &str) -> Option<f64> {
+    let blocks = limits.iter().filter_map(|limiter| nodes.node(&limiter.node));
+    blocks.filter_map(|node| nodes.number(node, key)).min_by(f64::total_cmp)
+}

@@ -19,7 +19,7 @@ pub(crate) struct Contact {
 }
 
 /// How one feature answers the commanded motion of the sensor.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub(crate) struct Answer {
     /// Change of the feature for each metre along x, y and z of the sensor.
@@ -45,6 +45,10 @@ pub(crate) struct Answer {
     /// Latency of this feature, instead of that of the contact [ms].
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(crate) latency_ms: Option<f64>,
+    /// What was measured in place of resonance and latency: frequency [Hz], answer as a multiple of that to a slow motion
+    /// [1], and its phase [deg].
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub(crate) response: Vec<[f64; 3]>,
 }
 
 /// Damping of a resonance that a bench states without one: that of the paper's arm [1].
@@ -78,6 +82,12 @@ impl Answer {
         self.resonance_hz.map(|hz| (2.0 * std::f64::consts::PI * hz, damping))
     }
 
+    fn has_response_in_order(&self) -> bool {
+        let is_known = |[hz, multiple, phase]: &[f64; 3]| *hz > 0.0 && *multiple > 0.0 && phase.is_finite();
+        let is_finite = self.response.iter().flatten().all(|number| number.is_finite());
+        is_finite && self.response.iter().all(is_known) && self.response.is_sorted_by(|a, b| a[0] < b[0])
+    }
+
     fn check(&self, feature: &str) -> Result<(), String> {
         let positive = [("resonance_hz", self.resonance_hz), ("damping_ratio", self.damping_ratio)];
         let bad =
@@ -86,6 +96,10 @@ impl Answer {
             Some((key, Some(value))) => {
                 Err(format!("`{key}` of `{feature}` is {value}: write a number greater than 0"))
             }
+            _ if !self.has_response_in_order() => Err(format!(
+                "`response` of `{feature}`: write [Hz, multiple, deg] for frequencies from low to high, with multiples \
+                 greater than 0"
+            )),
             _ if self.row().iter().any(|entry| !entry.is_finite()) => Err(format!("`{feature}` has no finite answer")),
             _ => Ok(()),
         }
@@ -108,16 +122,19 @@ impl Contact {
         Some(&*self.object).filter(|object| !object.is_empty())
     }
 
-    /// Returns whether geometry alone says how a feature answers: the bench states neither a resonance nor a latency.
+    /// Returns whether geometry alone says how a feature answers: the bench states neither a resonance nor a latency nor a
+    /// response.
     pub(crate) fn is_by_geometry(&self, feature: &str) -> bool {
         let stated = self.features.get(feature);
-        let is_measured = stated.is_some_and(|answer| answer.resonance_hz.is_some() || answer.latency_ms.is_some());
-        !is_measured && Answer::of_geometry(feature).is_some()
+        let states_dynamics = |answer: &Answer| {
+            answer.resonance_hz.is_some() || answer.latency_ms.is_some() || !answer.response.is_empty()
+        };
+        !stated.is_some_and(states_dynamics) && Answer::of_geometry(feature).is_some()
     }
 
     /// Returns how a feature answers: as the bench says, or else by geometry.
     pub(crate) fn answer(&self, feature: &str) -> Option<Answer> {
-        self.features.get(feature).copied().or_else(|| Answer::of_geometry(feature))
+        self.features.get(feature).cloned().or_else(|| Answer::of_geometry(feature))
     }
 
     fn check(&self) -> Result<(), String> {
@@ -179,6 +196,15 @@ mod tests {
                 r#"contacts = [{ object = "ball", pressure = { vz = 1.0, resonance_hz = 0.0 } }]"#,
                 "`resonance_hz` of `pressure` is 0",
             ),
+            (
+                r#"contacts = [{ object = "ball", x = { vx = -1.0, response = [[2.0, 1.0, 0], [1.0, 1.0, 0]] } }]"#,
+                "frequencies from low to high",
+            ),
+            (
+                r#"contacts = [{ object = "ball", x = { vx = -1.0, response = [[2.0, 0.0, 0]] } }]"#,
+                "multiples greater than 0",
+            ),
+            (r#"contacts = [{ object = "ball", x = { vx = -1.0, response = [[2.0, 1.0]] } }]"#, "length"),
             (r#"contacts = [{ object = "ball", latency_ms = -1.0 }]"#, "`latency_ms` is -1"),
             (r#"contacts = [{ object = "ball", pressure = { vz = nan } }]"#, "no finite answer"),
         ] {

@@ -6,8 +6,9 @@
 //!
 //! K is the `pid`, c the column behind all projectors, J the answer of the feature to the motion of the sensor, A the
 //! resonance of arm and contact, and F the filters. A command is held for one period, and T / (z - 1) is the travel at
-//! the samples, exact up to half of the rate of the graph if the arm is stiff. Not in it: limits, dry friction,
-//! hysteresis, and what one feature does to another.
+//! the samples, exact up to half of the rate of the graph if the arm is stiff. Where the bench states a measured response,
+//! it counts instead of A and the latency. Not in it: limits, dry friction, hysteresis, and what one feature does to
+//! another.
 
 use nalgebra::Complex;
 
@@ -29,8 +30,6 @@ pub(crate) struct Loop {
     pub(crate) period: f64,
     /// What was measured, as a multiple of the model, at circular frequencies from low to high [rad/s]; empty if nothing was.
     measured: Vec<(f64, Complex<f64>)>,
-    /// Whether it answers the measurement of the loop that it adds to.
-    is_same_measurement: bool,
     /// Loops of the same measurement, or through the same motion, which add to this one.
     beside: Vec<Self>,
 }
@@ -58,8 +57,7 @@ impl Loop {
             if is_needed && around.is_none() {
                 return None;
             }
-            let is_same_measurement = other.measured == feature.measured;
-            beside.extend(around.map(|around| Self { is_same_measurement, ..around }));
+            beside.extend(around);
         }
         (around.gain != 0.0).then_some(Self { beside, ..around.times(factor) })
     }
@@ -69,9 +67,13 @@ impl Loop {
         let gain = answer.along(&feature.column);
         let Feature { kp, ki, kd, period_s: period, .. } = *feature;
         let shapes = feature.filters.iter().map(|filter| filter.shape).collect();
-        let (resonance, measured, beside) = (answer.resonance(), Vec::new(), Vec::new());
-        let is_same_measurement = true;
-        Self { kp, ki, kd, shapes, gain, resonance, latency, period, measured, is_same_measurement, beside }
+        let (resonance, beside) = (answer.resonance(), Vec::new());
+        let around = Self { kp, ki, kd, shapes, gain, resonance, latency, period, measured: Vec::new(), beside };
+        let measured = answer.response.iter().map(|[hz, multiple, phase]| {
+            let omega = 2.0 * std::f64::consts::PI * hz;
+            (omega, turn(-phase.to_radians()) * *multiple / around.modelled(omega))
+        });
+        Self { measured: measured.collect(), ..around }
     }
 
     /// Returns the same loop with all gains of the controller times a factor. Those of the loops beside it stay.
@@ -83,15 +85,6 @@ impl Loop {
     /// Returns the same loop without the derivative of its own controller.
     pub(crate) fn without_derivative(&self) -> Self {
         Self { kd: 0.0, ..self.clone() }
-    }
-
-    /// Returns the same loop as it was measured: as a multiple of the model, at circular frequencies from low to high
-    /// [rad/s].
-    pub(crate) fn measured(&self, measured: Vec<(f64, Complex<f64>)>) -> Self {
-        let of =
-            |other: &Self| if other.is_same_measurement { other.measured(measured.clone()) } else { other.clone() };
-        let beside = self.beside.iter().map(of).collect();
-        Self { measured, beside, ..self.clone() }
     }
 
     /// Returns the number of poles at zero: the motion integrates, and so does `ki`.
@@ -128,9 +121,14 @@ impl Loop {
 
     /// Returns L at a circular frequency [rad/s].
     pub(crate) fn open(&self, omega: f64) -> Complex<f64> {
-        let model = self.known(omega) * resonance(omega, self.resonance) * turn(omega * self.latency) * self.gain;
+        let model = self.known(omega) * self.modelled(omega) * self.gain;
         let beside: Complex<f64> = self.beside.iter().map(|other| other.open(omega)).sum();
         model * between(&self.measured, omega) + beside
+    }
+
+    /// Returns the response of arm and contact by resonance and latency, as a multiple of that to a slow motion.
+    fn modelled(&self, omega: f64) -> Complex<f64> {
+        resonance(omega, self.resonance) * turn(omega * self.latency)
     }
 
     /// Returns the response of controller, travel and filters, which a graph states.
@@ -224,6 +222,31 @@ mod tests {
         let half = 0.5_f64.sqrt() * 4.0;
         assert!((at(2.0) - Complex::new(half, half)).norm() < 1e-12, "{}", at(2.0));
         assert_eq!(between(&[], 2.0), Complex::from(1.0));
+    }
+
+    #[test]
+    fn a_measured_response_counts_in_place_of_resonance_and_latency() {
+        let feature = Feature {
+            name: "pressure".into(),
+            column: [0.0, 0.0, 1.0, 0.0, 0.0, 0.0],
+            kp: 0.5,
+            period_s: 0.004,
+            ..Feature::default()
+        };
+        let response = vec![[0.5, 1.0, 0.0], [3.0, 1.5, -40.0]];
+        let modelled = Answer { vz: Some(7.0), resonance_hz: Some(6.0), ..Answer::default() };
+        let measured = Answer { response, ..modelled.clone() };
+        let [modelled, measured] = [modelled, measured].map(|answer| Loop::new(&feature, &answer, 0.02));
+        let at =
+            |hz: f64| measured.open(2.0 * std::f64::consts::PI * hz) / measured.known(2.0 * std::f64::consts::PI * hz);
+        assert!((at(0.5) - Complex::from(7.0)).norm() < 1e-9, "{}", at(0.5));
+        assert!((at(3.0) - Complex::from_polar(7.0 * 1.5, -40_f64.to_radians())).norm() < 1e-9, "{}", at(3.0));
+        // Beyond its frequencies it goes on as the model does.
+        let ratio = |hz: f64| {
+            let omega = 2.0 * std::f64::consts::PI * hz;
+            measured.open(omega) / modelled.open(omega)
+        };
+        assert!((ratio(5.0) - ratio(9.0)).norm() < 1e-9 && (ratio(3.0) - ratio(5.0)).norm() < 1e-9);
     }
 
     #[test]

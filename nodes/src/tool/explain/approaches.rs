@@ -1,9 +1,8 @@
 //! The stopping distance of each motion, and the impact force of a touch.
 
 use serde::Serialize;
-use tactflow_runtime::graph::OutlinedBlock;
 
-use crate::tool::control::chain::Limiter;
+use crate::tool::control::chain::{Limiter, smallest};
 use crate::tool::control::contacts::Contact;
 use crate::tool::control::law::Law;
 use crate::tool::control::nodes::Nodes;
@@ -85,10 +84,4 @@ fn approach(
         stopping_distance_m: speed * reaction + speed * speed / (2.0 * deceleration),
         impacts: contacts.iter().filter_map(impact).collect(),
     })
-}
-
-/// Returns the smallest value that the limiters have for a parameter.
-fn smallest(nodes: &Nodes<'_>, limits: &[Limiter], key: &str) -> Option<f64> {
-    let blocks = limits.iter().filter_map(|limiter| nodes.node(&limiter.node));
-    blocks.filter_map(|node: &OutlinedBlock| nodes.number(node, key)).min_by(f64::total_cmp)
 }

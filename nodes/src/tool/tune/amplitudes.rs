@@ -17,10 +17,10 @@ const FURTHER: f64 = 1.3;
 /// Change of the response from one amplitude to the next with which the larger one counts [1].
 const MAX_CHANGE: f64 = 0.5;
 /// The component that presses, and lifts off.
-const PRESSES: usize = 2;
+pub(super) const PRESSES: usize = 2;
 /// Motions that count where no larger ones do, as a share of one that lifts the pad off [1]. Two must be left to compare,
 /// so this is the last motion.
-pub(super) const NEAR: f64 = 0.25;
+pub(super) const NEAR: f64 = 0.5;
 
 /// What the motions of all amplitudes say.
 pub(super) struct Response {
@@ -54,7 +54,7 @@ pub(super) enum Unknown {
 /// largest motions that agree. Friction hides a small motion, and gives two of them the same wrong response: no larger
 /// motion may have a larger one. If the last two only differ a little, the larger response counts, which has the smaller
 /// margins: a contact may stiffen when it is pressed further, and press less when it is nearly left. If a motion lifts
-/// the pad off, and those before it differ much, only those of up to a fourth of it count.
+/// the pad off, and no two before it agree, only those of up to half of it count.
 pub(super) fn agreed(
     experiment: &Experiment<'_>,
     component: usize,
@@ -86,11 +86,12 @@ pub(super) fn agreed(
             Answered::Interrupted => return Err(Stop::Interrupted),
         }
     }
-    if let Some((lines, growth, last)) = largest(&runs) {
-        return Ok(Ok(Response { lines, growth, limited: limited[last].take(), lifts_off: None }));
-    }
     // A light contact is not linear where a motion nearly lifts the pad off.
     let lifts_off = stopped.as_ref().map(|_| amplitudes[runs.len()]).filter(|_| component == PRESSES && is_absent);
+    let known = largest(&runs).filter(|(_, growth, _)| growth.is_none() || lifts_off.is_none());
+    if let Some((lines, growth, last)) = known {
+        return Ok(Ok(Response { lines, growth, limited: limited[last].take(), lifts_off: None }));
+    }
     let near = |amplitude: &&f64| lifts_off.is_some_and(|lifts_off| **amplitude <= NEAR * lifts_off);
     if let Some((lines, growth, last)) = largest(&runs[..amplitudes.iter().take_while(near).count()]) {
         return Ok(Ok(Response { lines, growth, limited: limited[last].take(), lifts_off }));

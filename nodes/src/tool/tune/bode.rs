@@ -1,6 +1,7 @@
-//! The Bode plot of `tune`: each loop with its gains, as fitted and as measured.
+//! The Bode plot of `tune`: each loop with its gains.
 //!
-//! A curve is L(f) of the model, a dot is a measured frequency. The phase of a dot is drawn next to its curve.
+//! A curve is L(f), and a dot is a measured frequency. Between them, and beyond them, the curve has the shape of the fit. The
+//! phase of a dot is drawn next to its curve.
 
 use std::f64::consts::PI;
 

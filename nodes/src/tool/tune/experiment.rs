@@ -9,15 +9,12 @@ use tactflow_runtime::source::{Code, Report};
 use super::gain_keys::gains;
 use super::lift;
 use super::limited::{Limited, Watch};
-use super::signal::{Sine, duration, measured, settling};
+use super::signal::{Pace, Sine, duration, measured, settling};
 use super::spectrum::{Line, line};
 use super::stay::Stay;
 use crate::motion::COMPONENTS;
 use crate::tool::control::law::Feature;
 
-/// Largest speed of the test signal along each component [m/s], [rad/s]. Ceilings of force let a pad move no faster into
-/// an object. Along the object it must overcome friction.
-const FASTEST: [f64; 6] = [0.015, 0.015, 0.006, 0.3, 0.3, 0.3];
 /// Beginning of the names of the nodes that make the test signal.
 const SIGNAL: &str = "tune";
 
@@ -30,6 +27,8 @@ pub(super) struct Experiment<'a> {
     /// The node that adds the test signal to the motion.
     pub(super) adder: &'a str,
     pub(super) feature: &'a Feature,
+    /// How fast the signal moves along each component at most.
+    pub(super) pace: [Pace; 6],
     /// Period of the graph [s].
     pub(super) period: f64,
     /// Share of the gains of the graph with which it is measured [1].
@@ -125,7 +124,6 @@ impl Experiment<'_> {
     /// Returns the settings of a run: the signal, its way into the motion, the share of the gains, and the end.
     fn settings(&self, component: usize, amplitude: f64) -> Vec<String> {
         let unit = if component < 3 { "m/s" } else { "rad/s" };
-        let fastest = FASTEST[component];
         let mut set = lift::settings(self.outline, self.mode, self.adder, measured(self.period) + self.period);
         for (i, sine) in Sine::all(self.period).iter().enumerate() {
             let hz = 1.0 / (sine.ticks as f64 * self.period);
@@ -136,7 +134,7 @@ impl Experiment<'_> {
                 format!("nodes.{signal}.in.gate=modes.{}", self.mode.name),
                 format!("nodes.{signal}.form=sine"),
                 format!("nodes.{signal}.unit={unit}"),
-                format!("nodes.{signal}.amplitude={:?}", sine.speed(amplitude, fastest, self.period)),
+                format!("nodes.{signal}.amplitude={:?}", sine.speed(amplitude, self.pace[component], self.period)),
                 format!("nodes.{signal}.frequency={hz:?}"),
                 format!("nodes.{signal}.start={:?}", sine.begin as f64 * self.period),
                 format!("nodes.{signal}.duration={lasts:?}"),

@@ -4,6 +4,7 @@ use nalgebra::Complex;
 use serde::Serialize;
 
 use super::spectrum::Line;
+use crate::tool::control::digits::to_three_digits;
 use crate::tool::control::response::resonance;
 use crate::tool::control::shape::turn;
 
@@ -22,17 +23,23 @@ pub(super) struct Fit {
     pub(super) frequencies: usize,
 }
 
-/// Largest error of a frequency that is compared with the fit [1].
+/// Largest error of a frequency that counts as it was measured, and not as the fit has it [1].
 const CLEAR: f64 = 0.1;
 
 impl Fit {
-    /// Returns what was measured as a multiple of the fit, at the frequencies that noise hardly changes. `known` is that
-    /// of the fit.
-    pub(super) fn missed(&self, lines: &[Line], known: impl Fn(f64) -> Complex<f64>) -> Vec<(f64, Complex<f64>)> {
-        let own = self.resonance.map(|(hz, damping)| (2.0 * std::f64::consts::PI * hz, damping));
-        let fitted = |omega: f64| known(omega) * resonance(omega, own) * turn(omega * self.latency) * self.gain;
-        let clear = lines.iter().filter(|line| line.error <= CLEAR);
-        clear.map(|line| (line.omega, line.open / fitted(line.omega))).collect()
+    /// Returns what was measured at the frequencies that noise hardly changes: frequency [Hz], answer as a multiple of that
+    /// to a slow motion [1], and its phase [deg]. A few frequencies alone are none. `known` is that of the fit.
+    pub(super) fn response(&self, lines: &[Line], known: impl Fn(f64) -> Complex<f64>) -> Vec<[f64; 3]> {
+        let clear: Vec<&Line> = lines.iter().filter(|line| line.error <= CLEAR).collect();
+        if clear.len() < ENOUGH {
+            return Vec::new();
+        }
+        let answer = |line: &&Line| {
+            let answer = line.open / known(line.omega) / self.gain;
+            let hz = line.omega / (2.0 * std::f64::consts::PI);
+            [to_three_digits(hz), to_three_digits(answer.norm()), answer.arg().to_degrees().round()]
+        };
+        clear.iter().map(answer).collect()
     }
 }
 
@@ -226,6 +233,21 @@ mod tests {
             assert!((own / hz - 1.0).abs() < 0.03 && (ratio / damping - 1.0).abs() < 0.12, "{found:?}");
             assert!((found.latency - latency).abs() < 0.003, "{found:?}");
         }
+    }
+
+    #[test]
+    fn a_response_has_the_frequencies_that_noise_hardly_changes_if_they_are_enough() {
+        let mut lines = lines(-2.0, None, 0.03, 0.0);
+        let found = fit(&lines, |_| Complex::from(1.0)).unwrap();
+        lines[3].error = 1.5 * CLEAR;
+        let response = found.response(&lines, |_| Complex::from(1.0));
+        assert_eq!(response.len(), lines.len() - 1);
+        for [hz, multiple, phase] in &response {
+            let off = (phase + 360.0 * hz * 0.03 + 180.0).rem_euclid(360.0) - 180.0;
+            assert!((multiple - 1.0).abs() < 0.01 && off.abs() < 2.0, "{multiple} at {hz} Hz, {off} deg off");
+        }
+        lines.iter_mut().skip(ENOUGH).for_each(|line| line.error = 1.5 * CLEAR);
+        assert!(found.response(&lines, |_| Complex::from(1.0)).is_empty());
     }
 
     #[test]

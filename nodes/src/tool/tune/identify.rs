@@ -119,20 +119,21 @@ fn sticks(quantity: &str, component: usize, fit: &Fit) -> bool {
 }
 
 /// Returns the response of what the graph states, at half of the gains and for one component alone.
-pub(super) fn known(feature: &Feature, component: usize) -> impl Fn(f64) -> Complex<f64> {
+fn known(feature: &Feature, component: usize) -> impl Fn(f64) -> Complex<f64> {
     let around = Loop::new(feature, &Answer::default(), 0.0).times(HALF);
     let column = feature.column[component];
     move |omega| around.known(omega) * column
 }
 
-/// Returns the answer of a feature to all components. The resonance and the latency are those of the first one.
+/// Returns the answer of a feature to all components. The resonance and the latency are those of the first one, and the
+/// measured response is that of one which is alone.
 ///
 /// A contact that sticks follows a small motion only in part. It can slide at any time, so what geometry says counts if
 /// it is more.
-pub(super) fn answer(quantity: &str, fits: &[(&'static str, Fit)]) -> Answer {
-    let geometry = Answer::of_geometry(quantity).unwrap_or_default().row();
+pub(super) fn answer(feature: &Feature, found: &Identified) -> Answer {
+    let geometry = Answer::of_geometry(&quantity(feature)).unwrap_or_default().row();
     let mut answer = Answer::default();
-    for (component, fit) in fits {
+    for (component, fit) in &found.fits {
         let entry = match *component {
             "vx" => &mut answer.vx,
             "vy" => &mut answer.vy,
@@ -141,15 +142,22 @@ pub(super) fn answer(quantity: &str, fits: &[(&'static str, Fit)]) -> Answer {
             "wy" => &mut answer.wy,
             _ => &mut answer.wz,
         };
-        let index = COMPONENTS.iter().position(|name| name == component);
-        let slides = index.map_or(0.0, |i| geometry[i]);
+        let slides = geometry[index(component)];
         *entry = Some(if slides.abs() > fit.gain.abs() { slides } else { to_three_digits(fit.gain) });
     }
-    let Some((_, main)) = fits.first() else { return answer };
+    let Some((_, main)) = found.fits.first() else { return answer };
+    if let ([(component, fit)], [lines]) = (&found.fits[..], &found.lines[..]) {
+        answer.response = fit.response(lines, known(feature, index(component)));
+    }
     answer.resonance_hz = main.resonance.map(|(hz, _)| to_three_digits(hz));
     answer.damping_ratio = main.resonance.map(|(_, damping)| to_three_digits(damping));
     answer.latency_ms = Some((main.latency * 1e4).round() / 10.0);
     answer
+}
+
+/// Returns the number of a component with this name.
+fn index(component: &str) -> usize {
+    COMPONENTS.iter().position(|name| *name == component).unwrap_or_default()
 }
 
 /// Returns the name of what a feature measures.

@@ -33,7 +33,7 @@ use tactflow_runtime::engine::Engine;
 use tactflow_runtime::graph::{Outline, Request, compile};
 
 use super::arguments::{may_draw, write};
-use super::control::chain::chain;
+use super::control::chain::{chain, smallest};
 use super::control::choose::Wanted;
 use super::control::collect::law;
 use super::control::contacts::Contact;
@@ -42,6 +42,7 @@ use cases::{Case, cases};
 use propose::Measurement;
 use ranges::Range;
 use settled::{Settled, compare};
+use signal::Pace;
 use target::{adder, controlled};
 use trial::Trial;
 use tuned::Tuned;
@@ -96,7 +97,7 @@ pub(super) struct TuneArgs {
     /// Write the gains into the graph, and the contacts into the benches; comments stay
     #[arg(long)]
     save: bool,
-    /// Draw the loops as a Bode plot: what is measured, and the fit with the proposed gains
+    /// Draw the loops with the proposed gains as a Bode plot, with the measured frequencies
     #[arg(long, value_name = "FILE.svg")]
     svg: Option<PathBuf>,
     /// Output format
@@ -177,7 +178,7 @@ fn writable(path: &Path) -> Result<(), String> {
 fn tune(args: &TuneArgs, shell: &Shell, request: &Request, outline: &Outline) -> Result<Tuned, Stop> {
     let command = commands(outline).next().ok_or("no role is an arm, so nothing moves".to_owned())?;
     let index = Index::new(outline);
-    let (_, twist) = chain(&Nodes::new(&index, None), command.port)?;
+    let (limits, twist) = chain(&Nodes::new(&index, None), command.port)?;
     let (mode, controlled) = controlled(args, &index, &twist, command.arm)?;
     let adder = adder(&index, &twist)?;
     let nodes = Nodes::new(&index, Some(mode));
@@ -186,7 +187,8 @@ fn tune(args: &TuneArgs, shell: &Shell, request: &Request, outline: &Outline) ->
     let request = &Request { set: [&request.set[..], &still].concat(), ..request.clone() };
     let wanted = Wanted { peak: args.peak, gain_db: args.gain_margin, phase_deg: args.phase_margin };
     let cases: Vec<Case> = cases(args, request, shell)?;
-    let measurement = Measurement { shell, outline, mode, adder: &adder, cases: &cases, wanted };
+    let pace = Pace::all(|key| smallest(&nodes, &limits, key));
+    let measurement = Measurement { shell, outline, mode, adder: &adder, cases: &cases, pace, wanted };
     let mut contacts: Vec<Contact> = cases.iter().map(Case::contact).collect();
     let mut features = Vec::new();
     for feature in &controlled {

@@ -177,11 +177,10 @@ fn gains(feature: &TunedFeature) -> String {
     let rows: Vec<[String; 6]> = [MARGINS.map(str::to_owned)].into_iter().chain(rows).collect();
     let table = if rows.len() > 1 { table(&rows, 1, 6) } else { String::new() };
     let mut text = format!("\nkp {old_kp} becomes {kp}, ki {old_ki} becomes {ki}, kd {old_kd} becomes {kd}:\n{table}");
-    if let Some(Bound { object, is_measured, margin }) = &feature.bound {
-        let of = if *is_measured { "measured response" } else { "loop" };
+    if let Some(Bound { object, margin }) = &feature.bound {
         let _ = writeln!(
             text,
-            "With a tenth more, the {of} over `{object}` has {margin}: that is beyond the wanted margins."
+            "With a tenth more, the loop over `{object}` has {margin}: that is beyond the wanted margins."
         );
     }
     for found in feature.answers.iter().filter(|found| found.refused.is_some()) {

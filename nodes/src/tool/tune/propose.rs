@@ -7,14 +7,14 @@ use tactflow_runtime::cli::Shell;
 use tactflow_runtime::graph::{Outline, OutlinedMode};
 
 use super::Stop;
-use super::amplitudes::Unknown;
+use super::amplitudes::{PRESSES, Unknown};
 use super::cases::Case;
 use super::climb::{self, Followed, Rung};
 use super::experiment::{Experiment, HALF};
-use super::identify::{Identified, answer, identify, known, quantity};
+use super::identify::{Identified, answer, identify, quantity};
+use super::signal::Pace;
 use super::step::{Planned, STEPS};
 use super::trial::{Run, Trial};
-use crate::motion::COMPONENTS;
 use crate::tool::control::choose::{Wanted, bound, factor};
 use crate::tool::control::contacts::Contact;
 use crate::tool::control::digits::{down_to_two_digits, to_three_digits, to_two_digits};
@@ -26,8 +26,6 @@ use crate::tool::control::response::Loop;
 #[derive(Debug, Serialize)]
 pub(super) struct Bound {
     pub(super) object: String,
-    /// Whether the measured response decides, and not the fit or the geometry.
-    pub(super) is_measured: bool,
     /// The margin with a tenth more, for a sentence.
     pub(super) margin: String,
 }
@@ -114,7 +112,9 @@ impl TunedFeature {
 
 /// Proposed gains, as a multiple of those of the graph, with which a loop is not measured again [1].
 const NEAR: RangeInclusive<f64> = 0.83..=3.0;
-/// Shares of the gains of the graph with which a loop is measured again that a test signal drives out of its mode [1].
+/// Speeds of the test signal with which a pressure is measured again that a faster one drives out of its mode, as parts [1].
+const SLOWER: [f64; 2] = [0.4, 0.2];
+/// Shares of the gains of the graph with which such a loop is measured again [1].
 const SMALLER: [(f64, &str); 2] = [(0.125, "an eighth of its gains"), (0.25, "a quarter of its gains")];
 /// Share of the proposed gains with which it is measured again [1].
 const QUARTER: f64 = 0.25;
@@ -127,6 +127,8 @@ pub(super) struct Measurement<'a> {
     /// The node that adds the test signal to the motion.
     pub(super) adder: &'a str,
     pub(super) cases: &'a [Case],
+    /// How fast the test signal moves along each component at most.
+    pub(super) pace: [Pace; 6],
     pub(super) wanted: Wanted,
 }
 
@@ -138,15 +140,25 @@ impl Measurement<'_> {
         feature: &Feature,
         contacts: &[Contact],
     ) -> Result<(TunedFeature, Vec<Contact>), Stop> {
-        let say = |gains: &str| self.shell.say_beside(&format!("`{}`: again, with {gains}", feature.name));
-        let mut found = self.measured(feature, contacts, HALF)?;
+        let say = |how: &str| self.shell.say_beside(&format!("`{}`: again, with {how}", feature.name));
+        let (mut found, mut part) = (self.measured(feature, contacts, HALF, 1.0)?, 1.0);
+        let is_lost = |found: &TunedFeature| found.is(Unknown::Lost) && !found.is(Unknown::NotReached);
+        // At its resonance, a contact swings further than the test signal moves, and is nearly left.
+        for slower in SLOWER {
+            if !is_lost(&found.0) || feature.column[PRESSES] == 0.0 {
+                break;
+            }
+            say("a slower test signal");
+            part = slower;
+            found = self.measured(feature, contacts, HALF, part)?;
+        }
         for (share, name) in SMALLER {
-            if !found.0.is(Unknown::Lost) || found.0.is(Unknown::NotReached) {
+            if !is_lost(&found.0) {
                 break;
             }
             // A loop that hardly holds the contact loses it with a test signal.
             say(name);
-            let again = self.measured(feature, contacts, share)?;
+            let again = self.measured(feature, contacts, share, part)?;
             // The first reason is that of the task as it is.
             found = if again.0.is_measured() { again } else { found };
         }
@@ -154,7 +166,7 @@ impl Measurement<'_> {
         // has not settled when the signal begins.
         if let Some(factor) = found.0.factor().filter(|factor| !NEAR.contains(factor)) {
             say("a quarter of the gains that were found");
-            let again = self.measured(feature, contacts, QUARTER * factor)?;
+            let again = self.measured(feature, contacts, QUARTER * factor, part)?;
             found = if again.0.new.is_some() { again } else { found };
         }
         // What a test signal drives out of its mode may be near instability, and steps would not show it. Friction can hide
@@ -191,23 +203,24 @@ impl Measurement<'_> {
         Ok(found)
     }
 
-    /// Measures a feature over all contacts with a share of its gains, and proposes gains.
+    /// Measures a feature over all contacts with a share of its gains and of the speed, and proposes gains.
     fn measured(
         &self,
         feature: &Feature,
         contacts: &[Contact],
         share: f64,
+        part: f64,
     ) -> Result<(TunedFeature, Vec<Contact>), Stop> {
         let Self { outline, mode, adder, .. } = *self;
+        let pace = self.pace.map(|pace| pace.times(part));
         let (catalogue, period) = (self.shell.catalogue(), outline.period_s);
         let mut contacts = contacts.to_vec();
         let found = self.cases.iter().zip(&mut contacts).map(|(case, contact)| {
             let request = &case.request;
-            let experiment = Experiment { catalogue, request, outline, mode, adder, feature, period, share };
+            let experiment = Experiment { catalogue, request, outline, mode, adder, feature, pace, period, share };
             let found = identify(&experiment, &case.object, self.shell)?;
             if found.refused.is_none() {
-                let quantity = quantity(feature);
-                contact.features.insert(quantity.clone(), answer(&quantity, &found.fits));
+                contact.features.insert(quantity(feature), answer(feature, &found));
             }
             Ok(found)
         });
@@ -222,16 +235,7 @@ fn propose(feature: Feature, answers: Vec<Identified>, contacts: &[Contact], wan
     let loops = contacts.iter().enumerate();
     let loops: Vec<(usize, Loop)> =
         loops.filter_map(|(i, contact)| Some((i, Loop::over(&feature, contact)?))).collect();
-    // A fit smooths what friction does near the crossover, so the margins must hold for the measured response too.
-    let measured = |(i, around): &(usize, Loop)| match (&answers[*i].fits[..], &answers[*i].lines[..]) {
-        ([(component, fit)], [lines]) => {
-            let component = COMPONENTS.iter().position(|name| name == component)?;
-            Some((*i, around.measured(fit.missed(lines, known(&feature, component)))))
-        }
-        _ => None,
-    };
-    let measured: Vec<(usize, Loop)> = loops.iter().filter_map(measured).collect();
-    let each: Vec<Loop> = measured.iter().chain(&loops).map(|(_, one)| one.clone()).collect();
+    let each: Vec<Loop> = loops.iter().map(|(_, one)| one.clone()).collect();
     let known = factor(&each, wanted);
     let factor = known.filter(|_| loops.len() == contacts.len() && answers.iter().all(|found| found.refused.is_none()));
     let (name, climbed, margins) = (feature.name.clone(), Vec::new(), Vec::new());
@@ -242,8 +246,8 @@ fn propose(feature: Feature, answers: Vec<Identified>, contacts: &[Contact], wan
     found.bound = new.and_then(|new| {
         let scaled: Vec<Loop> = each.iter().map(|around| around.times(new[0] / old[0])).collect();
         let (which, margin) = bound(&scaled, wanted)?;
-        let contact = measured.iter().chain(&found.loops).nth(which)?.0;
-        Some(Bound { object: found.answers[contact].object.clone(), is_measured: which < measured.len(), margin })
+        let (contact, _) = found.loops.get(which)?;
+        Some(Bound { object: found.answers[*contact].object.clone(), margin })
     });
     found.set(new);
     found

@@ -74,7 +74,7 @@ pub(super) fn value(contact: &Contact) -> Value {
 }
 
 fn inline(answer: &Answer) -> Value {
-    let Answer { vx, vy, vz, wx, wy, wz, resonance_hz, damping_ratio, latency_ms } = *answer;
+    let Answer { vx, vy, vz, wx, wy, wz, resonance_hz, damping_ratio, latency_ms, ref response } = *answer;
     let keys = [
         ("vx", vx),
         ("vy", vy),
@@ -90,5 +90,39 @@ fn inline(answer: &Answer) -> Value {
     for (key, value) in keys.into_iter().filter_map(|(key, value)| Some((key, value?))) {
         table.insert(key, value.into());
     }
+    if !response.is_empty() {
+        table.insert("response", points(response).into());
+    }
     table.into()
+}
+
+/// Number of points of a response on one line.
+const POINTS_OF_A_LINE: usize = 6;
+
+/// Writes a measured response: frequency, multiple and phase, several on a line.
+fn points(response: &[[f64; 3]]) -> Array {
+    let point = |[hz, multiple, phase]: &[f64; 3]| {
+        Array::from_iter([Value::from(*hz), Value::from(*multiple), Value::from(*phase as i64)])
+    };
+    let mut list = Array::from_iter(response.iter().map(point));
+    let lines = list.iter_mut().step_by(POINTS_OF_A_LINE);
+    lines.for_each(|point| point.decor_mut().set_prefix("\n    "));
+    list
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_contact_is_read_as_it_was_written() {
+        let response = (1..=11).map(|i| [0.5 * f64::from(i), 1.0 + 0.25 * f64::from(i), -7.0 * f64::from(i)]).collect();
+        let answer = Answer { vz: Some(7.0), latency_ms: Some(0.0), response, ..Answer::default() };
+        let contact =
+            Contact { object: "pen".into(), latency_ms: 4.0, features: [("pressure".to_owned(), answer)].into() };
+        let text = format!("contacts = {}", lines(std::slice::from_ref(&contact)));
+        let read: toml::Table = toml::from_str(&text).unwrap();
+        assert_eq!(read["contacts"].clone().try_into::<Vec<Contact>>().unwrap(), [contact]);
+        assert!(text.lines().all(|line| line.chars().count() <= 120), "{text}");
+    }
 }

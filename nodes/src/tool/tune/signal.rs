@@ -17,6 +17,39 @@ const MEASURING_S: f64 = 2.0;
 /// Time for the approach [s].
 const APPROACH_S: f64 = 20.0;
 
+/// Largest speed of the test signal along each component [m/s], [rad/s]. A faster one shows what friction hides of a
+/// resonance. Along the object, a faster one lets the contact slip out of its mode.
+const FASTEST: [f64; 6] = [0.015, 0.015, 0.03, 0.5, 0.5, 0.5];
+/// Part of the limits of a task that the test signal takes: the loop moves the sensor too [1].
+const SHARE_OF_LIMITS: f64 = 0.6;
+
+/// How fast the test signal moves along a component at most.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Pace {
+    /// Speed [m/s], [rad/s].
+    speed: f64,
+    /// Acceleration [m/s²], [rad/s²].
+    acceleration: f64,
+}
+
+impl Pace {
+    /// Returns the largest ones along each component, below the limits that `limit` returns for a key.
+    pub(super) fn all(limit: impl Fn(&str) -> Option<f64>) -> [Self; 6] {
+        let share = |key: &str| SHARE_OF_LIMITS * limit(key).unwrap_or(f64::INFINITY);
+        let linear = [share("linear_m_per_s"), share("linear_m_per_s2")];
+        let angular = [share("angular_rad_per_s"), share("angular_rad_per_s2")];
+        std::array::from_fn(|i| {
+            let [speed, acceleration] = if i < 3 { linear } else { angular };
+            Self { speed: FASTEST[i].min(speed), acceleration }
+        })
+    }
+
+    /// Returns a part of the speed.
+    pub(super) fn times(self, part: f64) -> Self {
+        Self { speed: part * self.speed, ..self }
+    }
+}
+
 /// One sine of the test signal.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Sine {
@@ -51,8 +84,9 @@ impl Sine {
     }
 
     /// Returns its amplitude as a speed, for an amplitude of the motion [m] or [rad].
-    pub(super) fn speed(&self, amplitude: f64, fastest: f64, period: f64) -> f64 {
-        (2.0 * PI * amplitude / (self.ticks as f64 * period)).min(fastest)
+    pub(super) fn speed(&self, amplitude: f64, most: Pace, period: f64) -> f64 {
+        let omega = 2.0 * PI / (self.ticks as f64 * period);
+        (omega * amplitude).min(most.speed).min(most.acceleration / omega)
     }
 }
 
@@ -75,4 +109,28 @@ pub(super) fn measured(period: f64) -> f64 {
 /// Returns how long a run takes at most, for ticks of `period` [s].
 pub(super) fn duration(period: f64) -> f64 {
     APPROACH_S + measured(period) + lift::LASTS_S
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_signal_keeps_below_the_limits_of_the_task() {
+        let limit = |key: &str| match key {
+            "linear_m_per_s" => Some(0.02),
+            "linear_m_per_s2" => Some(0.5),
+            _ => None,
+        };
+        let pace = Pace::all(limit);
+        for sine in Sine::all(0.004) {
+            let omega = 2.0 * PI / (sine.ticks as f64 * 0.004);
+            let speed = sine.speed(0.0048, pace[2], 0.004);
+            assert!(
+                speed <= 0.6 * 0.02 + 1e-12 && speed * omega <= 0.6 * 0.5 + 1e-12 && speed <= omega * 0.0048 + 1e-12
+            );
+            assert!(sine.speed(0.0048, pace[2].times(0.2), 0.004) <= 0.2 * 0.6 * 0.02 + 1e-12);
+            assert!(sine.speed(0.08, pace[5], 0.004) <= FASTEST[5]);
+        }
+    }
 }
