@@ -347,7 +347,8 @@ fn the_bode_plot_shows_the_margins_and_what_was_measured() {
     assert!((phase - margins["phase_deg"].as_f64().unwrap()).abs() < 1.5, "{drawn:?}: {margins}");
     let frequencies = feature["answers"][0]["fits"][0][1]["frequencies"].as_f64().unwrap();
     assert_eq!(dots, 2.0 * frequencies, "{drawn:?}");
-    assert!(far < 4.0, "a dot is {far} dB beside the fit");
+    // The curve goes through the dots, and geometry says 1 where 0.99 was measured.
+    assert!(far < 0.5, "a dot is {far} dB beside the curve");
 }
 
 /// Each run opens the simulator again, whose arm stands where the last run has left it.

@@ -53,6 +53,8 @@ pub(crate) struct Answer {
 
 /// Damping of a resonance that a bench states without one: that of the paper's arm [1].
 const USUAL_DAMPING: f64 = 0.2;
+/// Largest frequency of a response [Hz].
+const MAX_HZ: f64 = 1000.0;
 
 impl Answer {
     /// Returns what geometry alone says of a feature: a place moves against the sensor, and so does an angle about its
@@ -82,24 +84,39 @@ impl Answer {
         self.resonance_hz.map(|hz| (2.0 * std::f64::consts::PI * hz, damping))
     }
 
-    fn has_response_in_order(&self) -> bool {
-        let is_known = |[hz, multiple, phase]: &[f64; 3]| *hz > 0.0 && *multiple > 0.0 && phase.is_finite();
-        let is_finite = self.response.iter().flatten().all(|number| number.is_finite());
-        is_finite && self.response.iter().all(is_known) && self.response.is_sorted_by(|a, b| a[0] < b[0])
+    /// Returns by how much the feature answers late at most: by its latency, or at a frequency of its response [ms].
+    pub(crate) fn lag_ms(&self) -> Option<f64> {
+        let late = self.response.iter().map(|[hz, _, phase]| -phase / (360.0 * hz) * 1e3);
+        self.latency_ms.into_iter().chain(late).reduce(f64::max).map(|lag| (10.0 * lag).round() / 10.0)
+    }
+
+    /// Returns the first point of the response that is none, or that comes before a slower one.
+    fn bad_point(&self) -> Option<[f64; 3]> {
+        let mut last = 0.0;
+        self.response.iter().copied().find(|[hz, multiple, phase]| {
+            let is_good = *hz > last && *hz <= MAX_HZ && *multiple > 0.0 && multiple.is_finite() && phase.is_finite();
+            last = *hz;
+            !is_good
+        })
     }
 
     fn check(&self, feature: &str) -> Result<(), String> {
         let positive = [("resonance_hz", self.resonance_hz), ("damping_ratio", self.damping_ratio)];
         let bad =
             positive.into_iter().find(|(_, value)| value.is_some_and(|value| !(value > 0.0 && value.is_finite())));
+        if let Some(point) = self.bad_point() {
+            return Err(format!(
+                "`response` of `{feature}` has the point {point:?}: write [Hz, multiple, deg] for frequencies from low to high, \
+                 such as [4.0, 1.5, -30], with a multiple greater than 0"
+            ));
+        }
         match bad {
             Some((key, Some(value))) => {
                 Err(format!("`{key}` of `{feature}` is {value}: write a number greater than 0"))
             }
-            _ if !self.has_response_in_order() => Err(format!(
-                "`response` of `{feature}`: write [Hz, multiple, deg] for frequencies from low to high, with multiples \
-                 greater than 0"
-            )),
+            _ if self.latency_ms.is_some_and(|latency| !(latency >= 0.0 && latency.is_finite())) => {
+                Err(format!("`latency_ms` of `{feature}` is below 0 or no number: write 0 or more"))
+            }
             _ if self.row().iter().any(|entry| !entry.is_finite()) => Err(format!("`{feature}` has no finite answer")),
             _ => Ok(()),
         }
@@ -202,7 +219,7 @@ mod tests {
             ),
             (
                 r#"contacts = [{ object = "ball", x = { vx = -1.0, response = [[2.0, 0.0, 0]] } }]"#,
-                "multiples greater than 0",
+                "has the point [2.0, 0.0, 0.0]",
             ),
             (r#"contacts = [{ object = "ball", x = { vx = -1.0, response = [[2.0, 1.0]] } }]"#, "length"),
             (r#"contacts = [{ object = "ball", latency_ms = -1.0 }]"#, "`latency_ms` is -1"),

@@ -16,10 +16,13 @@ use super::contacts::{Answer, Contact};
 use super::law::Feature;
 use super::shape::{Shape, turn};
 
+/// Part of the lowest frequency of a response below which only the gain counts [1].
+const SLOW: f64 = 0.1;
+
 /// The loop of one feature over one contact.
 #[derive(Debug, Clone)]
 pub(crate) struct Loop {
-    kp: f64,
+    pub(crate) kp: f64,
     ki: f64,
     kd: f64,
     shapes: Vec<Shape>,
@@ -73,7 +76,9 @@ impl Loop {
             let omega = 2.0 * std::f64::consts::PI * hz;
             (omega, turn(-phase.to_radians()) * *multiple / around.modelled(omega))
         });
-        Self { measured: measured.collect(), ..around }
+        // To slower motions a contact answers by its gain.
+        let slow = answer.response.first().map(|[hz, ..]| (SLOW * 2.0 * std::f64::consts::PI * hz, Complex::from(1.0)));
+        Self { measured: slow.into_iter().chain(measured).collect(), ..around }
     }
 
     /// Returns the same loop with all gains of the controller times a factor. Those of the loops beside it stay.
@@ -241,7 +246,12 @@ mod tests {
             |hz: f64| measured.open(2.0 * std::f64::consts::PI * hz) / measured.known(2.0 * std::f64::consts::PI * hz);
         assert!((at(0.5) - Complex::from(7.0)).norm() < 1e-9, "{}", at(0.5));
         assert!((at(3.0) - Complex::from_polar(7.0 * 1.5, -40_f64.to_radians())).norm() < 1e-9, "{}", at(3.0));
-        // Beyond its frequencies it goes on as the model does.
+        // Beyond its frequencies it goes on as the model does, and far below them it answers by its gain.
+        assert!(
+            (at(0.01) - modelled.open(0.02 * std::f64::consts::PI) / modelled.known(0.02 * std::f64::consts::PI))
+                .norm()
+                < 1e-9
+        );
         let ratio = |hz: f64| {
             let omega = 2.0 * std::f64::consts::PI * hz;
             measured.open(omega) / modelled.open(omega)

@@ -3,7 +3,7 @@
 use serde::Serialize;
 
 use crate::tool::control::chain::{Limiter, smallest};
-use crate::tool::control::contacts::Contact;
+use crate::tool::control::contacts::{Answer, Contact};
 use crate::tool::control::law::Law;
 use crate::tool::control::nodes::Nodes;
 
@@ -62,7 +62,7 @@ fn approach(
     let speed = smallest(nodes, limits, "linear_m_per_s").map_or(wanted, |most| wanted.min(most));
     let into = velocity[2].max(0.0) * speed / wanted;
     let latency = contacts.iter().flat_map(|contact| {
-        let own = contact.features.values().filter_map(|answer| answer.latency_ms);
+        let own = contact.features.values().filter_map(Answer::lag_ms);
         own.chain([contact.latency_ms])
     });
     let reaction = 2.0 * nodes.period() + 1e-3 * latency.fold(0.0, f64::max);

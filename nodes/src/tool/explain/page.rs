@@ -204,8 +204,8 @@ fn loops(loops: &[Stability], style: &Style) -> String {
     if loops.iter().any(|one| one.by_geometry && one.margins.is_some()) {
         let _ = writeln!(
             text,
-            "{GEOMETRY}: the bench states neither resonance nor latency of this feature. Its margins leave out the arm and are\n\
-             too large, and a contact that sticks follows later. `tactflow tune` measures it."
+            "{GEOMETRY}: the bench states neither resonance nor latency nor response of this feature. Its margins leave out\n\
+             the arm and are too large, and a contact that sticks follows later. `tactflow tune` measures it."
         );
     }
     let found = loops.iter().filter_map(|one| Some((one, one.margins.as_ref()?)));

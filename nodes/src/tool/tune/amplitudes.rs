@@ -18,10 +18,6 @@ const FURTHER: f64 = 1.3;
 const MAX_CHANGE: f64 = 0.5;
 /// The component that presses, and lifts off.
 pub(super) const PRESSES: usize = 2;
-/// Motions that count where no larger ones do, as a share of one that lifts the pad off [1]. Two must be left to compare,
-/// so this is the last motion.
-pub(super) const NEAR: f64 = 0.5;
-
 /// What the motions of all amplitudes say.
 pub(super) struct Response {
     pub(super) lines: Vec<Line>,
@@ -29,7 +25,7 @@ pub(super) struct Response {
     pub(super) growth: Option<f64>,
     /// The limit that has acted most in the last of these motions, if it has acted much.
     pub(super) limited: Option<Limited>,
-    /// Amplitude of the motion that lifts the pad off, if only much smaller ones count [m].
+    /// Amplitude of the motion that lifts the pad off, if no two smaller ones agree [m].
     pub(super) lifts_off: Option<f64>,
 }
 
@@ -53,8 +49,7 @@ pub(super) enum Unknown {
 /// Moves further and further along a component, as far as the task stays in its mode, and returns the response to the
 /// largest motions that agree. Friction hides a small motion, and gives two of them the same wrong response: no larger
 /// motion may have a larger one. If the last two only differ a little, the larger response counts, which has the smaller
-/// margins: a contact may stiffen when it is pressed further, and press less when it is nearly left. If a motion lifts
-/// the pad off, and no two before it agree, only those of up to half of it count.
+/// margins: a contact may stiffen when it is pressed further, and press less when it is nearly left.
 pub(super) fn agreed(
     experiment: &Experiment<'_>,
     component: usize,
@@ -88,12 +83,8 @@ pub(super) fn agreed(
     }
     // A light contact is not linear where a motion nearly lifts the pad off.
     let lifts_off = stopped.as_ref().map(|_| amplitudes[runs.len()]).filter(|_| component == PRESSES && is_absent);
-    let known = largest(&runs).filter(|(_, growth, _)| growth.is_none() || lifts_off.is_none());
-    if let Some((lines, growth, last)) = known {
-        return Ok(Ok(Response { lines, growth, limited: limited[last].take(), lifts_off: None }));
-    }
-    let near = |amplitude: &&f64| lifts_off.is_some_and(|lifts_off| **amplitude <= NEAR * lifts_off);
-    if let Some((lines, growth, last)) = largest(&runs[..amplitudes.iter().take_while(near).count()]) {
+    if let Some((lines, growth, last)) = largest(&runs) {
+        let lifts_off = lifts_off.filter(|_| growth.is_some());
         return Ok(Ok(Response { lines, growth, limited: limited[last].take(), lifts_off }));
     }
     let agree = (1..runs.len()).any(|i| difference(&runs[i - 1], &runs[i]) < AGREES);

@@ -1,13 +1,15 @@
 //! The Bode plot of `tune`: each loop with its gains.
 //!
-//! A curve is L(f), and a dot is a measured frequency. Between them, and beyond them, the curve has the shape of the fit. The
-//! phase of a dot is drawn next to its curve.
+//! A curve is L(f), and a dot is a measured frequency. Of a feature that answers one component, the curve goes through the
+//! dots that noise hardly changes. Between and beyond them it has the shape of the fit. The phase of a dot is drawn next
+//! to its curve.
 
 use std::f64::consts::PI;
 
 use nalgebra::Complex;
 use tactflow_runtime::cli::svg::{INK, PlotAxis, STYLES, Svg};
 
+use super::experiment::HALF;
 use super::propose::TunedFeature;
 use super::spectrum::Line;
 use super::tuned::Tuned;
@@ -74,7 +76,7 @@ fn block(svg: &mut Svg, feature: &TunedFeature, top: f64) -> f64 {
     let measured = feature.loops.iter().filter(|(i, _)| feature.answers[*i].refused.is_none());
     for (i, around) in measured {
         let curve = curve(around);
-        draw(svg, *i, hz, [(magnitude, MAGNITUDE, 1), (phase, PHASE, 2)], &curve, &dots(feature, *i, &curve));
+        draw(svg, *i, hz, [(magnitude, MAGNITUDE, 1), (phase, PHASE, 2)], &curve, &dots(feature, *i, around, &curve));
     }
     bottom + GAPS[1]
 }
@@ -118,11 +120,11 @@ fn point(hz: f64, open: Complex<f64>, near: f64) -> Point {
     [hz, 20.0 * libm::log10(open.norm()), phase + 360.0 * ((near - phase) / 360.0).round()]
 }
 
-/// Returns the measured frequencies of a contact, with the gains of the picture. Each component that moves the feature
-/// was measured alone, with half of the gains of the graph.
-fn dots(feature: &TunedFeature, i: usize, curve: &[Point]) -> Vec<Point> {
+/// Returns the measured frequencies of a contact, with the gains of its loop. Each component that moves the feature was
+/// measured alone, with half of the gains of the graph and without the factor of a schedule.
+fn dots(feature: &TunedFeature, i: usize, around: &Loop, curve: &[Point]) -> Vec<Point> {
     let Some(first) = feature.answers[i].lines.first() else { return Vec::new() };
-    let scale = 2.0 * feature.new.map_or(1.0, |new| new[0] / feature.old[0]);
+    let scale = around.kp / (HALF * feature.old[0]);
     let all = |k: usize| feature.answers[i].lines.iter().filter_map(move |lines: &Vec<Line>| lines.get(k));
     let counts = |k: &usize| all(*k).all(Line::counts);
     let dot = |k: usize| {

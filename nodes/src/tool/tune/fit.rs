@@ -28,9 +28,12 @@ const CLEAR: f64 = 0.1;
 
 impl Fit {
     /// Returns what was measured at the frequencies that noise hardly changes: frequency [Hz], answer as a multiple of that
-    /// to a slow motion [1], and its phase [deg]. A few frequencies alone are none. `known` is that of the fit.
+    /// to a slow motion [1], and its phase [deg]. Empty if fewer than `ENOUGH` of them follow each
+    /// other. `known` is what the fit was given.
     pub(super) fn response(&self, lines: &[Line], known: impl Fn(f64) -> Complex<f64>) -> Vec<[f64; 3]> {
         let clear: Vec<&Line> = lines.iter().filter(|line| line.error <= CLEAR).collect();
+        let gap = clear.windows(2).position(|pair| pair[1].omega > MAX_GAP * pair[0].omega);
+        let clear = &clear[..gap.map_or(clear.len(), |i| i + 1)];
         if clear.len() < ENOUGH {
             return Vec::new();
         }
@@ -43,6 +46,8 @@ impl Fit {
     }
 }
 
+/// Largest ratio of two frequencies of a response that follow each other [1].
+const MAX_GAP: f64 = 4.0;
 /// Smallest number of frequencies that tell a resonance from a delay.
 pub(super) const ENOUGH: usize = 5;
 

@@ -31,7 +31,7 @@ pub(super) struct Identified {
     /// The limit that acted much while it was measured.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(super) limited: Option<Limited>,
-    /// Amplitude of the motion that lifts the pad off, if only much smaller ones count [m].
+    /// Amplitude of the motion that lifts the pad off, if no two smaller ones agree [m].
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(super) lifts_off: Option<f64>,
     /// Why there is no fit.

@@ -5,7 +5,7 @@ use std::path::Path;
 
 use tactflow_runtime::cli::table;
 
-use super::amplitudes::{NEAR, Unknown};
+use super::amplitudes::Unknown;
 use super::cases::Stated;
 use super::climb;
 use super::identify::Identified;
@@ -78,10 +78,9 @@ fn answers(found: &[Identified]) -> String {
         );
     }
     for (object, lifts_off) in found.iter().filter_map(|one| Some((&one.object, one.lifts_off?))) {
-        let most = to_three_digits(NEAR * lifts_off);
         let _ = writeln!(
             text,
-            "Over `{object}`, a test signal of {lifts_off} m lifts the pad off, so only those of up to {most} m count."
+            "Over `{object}`, a test signal of {lifts_off} m lifts the pad off, and no two smaller ones say the same."
         );
     }
     for (object, why) in found.iter().filter_map(|one| Some((&one.object, one.refused.as_ref()?))) {

@@ -112,9 +112,9 @@ impl TunedFeature {
 
 /// Proposed gains, as a multiple of those of the graph, with which a loop is not measured again [1].
 const NEAR: RangeInclusive<f64> = 0.83..=3.0;
-/// Speeds of the test signal with which a pressure is measured again that a faster one drives out of its mode, as parts [1].
+/// Parts of its speed with which the test signal presses again, if it has ended the mode [1].
 const SLOWER: [f64; 2] = [0.4, 0.2];
-/// Shares of the gains of the graph with which such a loop is measured again [1].
+/// Shares of the gains of the graph with which a loop is measured again that loses its mode [1].
 const SMALLER: [(f64, &str); 2] = [(0.125, "an eighth of its gains"), (0.25, "a quarter of its gains")];
 /// Share of the proposed gains with which it is measured again [1].
 const QUARTER: f64 = 0.25;
@@ -148,9 +148,11 @@ impl Measurement<'_> {
             if !is_lost(&found.0) || feature.column[PRESSES] == 0.0 {
                 break;
             }
-            say("a slower test signal");
-            part = slower;
-            found = self.measured(feature, contacts, HALF, part)?;
+            say(&format!("{:.0} % of the speed", 100.0 * slower));
+            let again = self.measured(feature, contacts, HALF, slower)?;
+            if !again.0.is(Unknown::Lost) && !again.0.is(Unknown::NotReached) {
+                (found, part) = (again, slower);
+            }
         }
         for (share, name) in SMALLER {
             if !is_lost(&found.0) {
@@ -235,7 +237,7 @@ fn propose(feature: Feature, answers: Vec<Identified>, contacts: &[Contact], wan
     let loops = contacts.iter().enumerate();
     let loops: Vec<(usize, Loop)> =
         loops.filter_map(|(i, contact)| Some((i, Loop::over(&feature, contact)?))).collect();
-    let each: Vec<Loop> = loops.iter().map(|(_, one)| one.clone()).collect();
+    let each: Vec<Loop> = loops.iter().map(|(_, around)| around.clone()).collect();
     let known = factor(&each, wanted);
     let factor = known.filter(|_| loops.len() == contacts.len() && answers.iter().all(|found| found.refused.is_none()));
     let (name, climbed, margins) = (feature.name.clone(), Vec::new(), Vec::new());

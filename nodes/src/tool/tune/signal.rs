@@ -44,9 +44,9 @@ impl Pace {
         })
     }
 
-    /// Returns a part of the speed.
+    /// Returns a part of it.
     pub(super) fn times(self, part: f64) -> Self {
-        Self { speed: part * self.speed, ..self }
+        Self { speed: part * self.speed, acceleration: part * self.acceleration }
     }
 }
 
@@ -67,15 +67,17 @@ impl Sine {
     /// Returns the sines of a test signal, one after the other, for ticks of `period` [s].
     pub(super) fn all(period: f64) -> Vec<Self> {
         let mut begin = (BEGIN_S / period).round() as usize;
-        let mut sine = |hz: f64| {
-            let ticks = (1.0 / (hz * period)).round().max(4.0) as usize;
+        let mut ticks = FREQUENCIES_HZ.map(|hz| (1.0 / (hz * period)).round().max(4.0) as usize).to_vec();
+        // A slow graph has no more than four ticks in the fastest sines.
+        ticks.dedup();
+        let sine = |ticks: usize| {
             let periods = |seconds: f64| (seconds / (ticks as f64 * period)).ceil() as usize;
             let sine =
                 Self { ticks, begin, settling: periods(SETTLING_S).max(1), measured: periods(MEASURING_S).max(3) };
             begin = sine.end();
             sine
         };
-        FREQUENCIES_HZ.map(&mut sine).into()
+        ticks.into_iter().map(sine).collect()
     }
 
     /// Returns the tick after its last one.
@@ -114,6 +116,17 @@ pub(super) fn duration(period: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_slow_graph_measures_each_frequency_once() {
+        for period in [0.004, 0.04, 0.1] {
+            let sines = Sine::all(period);
+            assert!(
+                sines.len() >= 5 && sines.is_sorted_by(|a, b| a.ticks > b.ticks && a.end() == b.begin),
+                "{sines:?}"
+            );
+        }
+    }
 
     #[test]
     fn a_signal_keeps_below_the_limits_of_the_task() {
