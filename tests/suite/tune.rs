@@ -302,7 +302,7 @@ fn a_light_press_is_measured_by_small_motions_and_its_gains_keep_the_contact() {
     let tuned: Value = serde_json::from_str(&said.out).unwrap();
     let feature = &tuned["features"][0];
     let answer = &feature["answers"][0];
-    assert_eq!(answer["lifts_off"].as_f64(), Some(4.8e-3), "{answer}");
+    assert_eq!(answer["lifts_off"].as_f64(), Some(2.4e-3), "{answer}");
     let [kp, gain] = [&feature["new"][0], &answer["fits"][0][1]["gain"]].map(|number| number.as_f64().unwrap());
     // The contact flickers with 0.5, which is the gain of the task.
     assert!((0.2..=0.4).contains(&kp), "{kp}");
