@@ -101,22 +101,21 @@ impl Answer {
     }
 
     fn check(&self, feature: &str) -> Result<(), String> {
-        let positive = [("resonance_hz", self.resonance_hz), ("damping_ratio", self.damping_ratio)];
-        let bad =
-            positive.into_iter().find(|(_, value)| value.is_some_and(|value| !(value > 0.0 && value.is_finite())));
         if let Some(point) = self.bad_point() {
             return Err(format!(
                 "`response` of `{feature}` has the point {point:?}: write [Hz, multiple, deg] for frequencies from low to high, \
                  such as [4.0, 1.5, -30], with a multiple greater than 0"
             ));
         }
-        match bad {
-            Some((key, Some(value))) => {
+        let positive = [("resonance_hz", self.resonance_hz), ("damping_ratio", self.damping_ratio)];
+        let bad =
+            positive.into_iter().find(|(_, value)| value.is_some_and(|value| !(value > 0.0 && value.is_finite())));
+        let late = self.latency_ms.filter(|latency| !(*latency >= 0.0 && latency.is_finite()));
+        match (bad, late) {
+            (Some((key, Some(value))), _) => {
                 Err(format!("`{key}` of `{feature}` is {value}: write a number greater than 0"))
             }
-            _ if self.latency_ms.is_some_and(|latency| !(latency >= 0.0 && latency.is_finite())) => {
-                Err(format!("`latency_ms` of `{feature}` is below 0 or no number: write 0 or more"))
-            }
+            (_, Some(latency)) => Err(format!("`latency_ms` of `{feature}` is {latency} ms: write 0 or more")),
             _ if self.row().iter().any(|entry| !entry.is_finite()) => Err(format!("`{feature}` has no finite answer")),
             _ => Ok(()),
         }
