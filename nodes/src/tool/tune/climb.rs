@@ -308,7 +308,8 @@ mod tests {
         assert_eq!((rung.worst(|step| step.overshoot), rung.worst(|step| step.error_s)), (0.7, 2.0));
         let restless = Rung::new(1.0, [1.0; 3], &[followed(Some(Step { rest: 0.35, ..step(1.0) }))]);
         assert_eq!((restless.failure.as_deref(), restless.error_s(&[])), (None, None));
-        let left = Followed { failure: Some("the task goes on to `press`".to_owned()), ..followed(Some(step(1.0))) };
-        assert_eq!(Rung::new(1.0, [1.0; 3], &[left]).failure.as_deref(), Some("the task goes on to `press`"));
+        let left =
+            Followed { failure: Some("the mode `servo` was left for `press`".to_owned()), ..followed(Some(step(1.0))) };
+        assert_eq!(Rung::new(1.0, [1.0; 3], &[left]).failure.as_deref(), Some("the mode `servo` was left for `press`"));
     }
 }

@@ -1,5 +1,6 @@
 //! The course of a trial: its modes, one after the other, and what is read in each of them.
 
+use super::lift;
 use super::stay::Stay;
 
 /// Rows of each mode of a trial.
@@ -13,7 +14,7 @@ pub(super) struct Course<R> {
     first: Stay<R>,
     /// Rows of the others.
     rows: Vec<Vec<R>>,
-    /// The first mode that was not the next one.
+    /// How a mode of a step ended that has not gone on to the next one.
     unplanned: Option<String>,
 }
 
@@ -35,13 +36,18 @@ impl<R> Course<R> {
         } else if self.modes[self.at] == now {
             self.rows[self.at].push(read());
         } else if self.at + 1 < self.modes.len() {
-            self.unplanned.get_or_insert_with(|| now.to_owned());
+            self.unplanned.get_or_insert_with(|| lift::left(&self.modes[self.at], now));
         }
     }
 
     /// Returns whether the first mode is over.
     pub(super) const fn has_stepped(&self) -> bool {
         self.at > 0
+    }
+
+    /// Returns whether the pad has bounced at the first touch, and the task has not found it again.
+    pub(super) const fn has_bounced(&self) -> bool {
+        self.first.has_bounced()
     }
 
     /// Returns the rows of a mode.
@@ -56,8 +62,8 @@ impl<R> Course<R> {
     /// Returns why the task has left its course.
     pub(super) fn failure(&self) -> Option<String> {
         match (self.first.left(), &self.unplanned) {
-            (Some(mode), _) => Some(format!("the task goes on to `{mode}`")),
-            (_, Some(mode)) => Some(format!("after a step of a setpoint, the task goes on to `{mode}`")),
+            (Some(mode), _) => Some(lift::left(&self.modes[0], mode)),
+            (_, Some(left)) => Some(format!("after a step of a setpoint, {left}")),
             _ if self.at + 1 < self.modes.len() => Some(format!("the run ended in the mode `{}`", self.modes[self.at])),
             _ => None,
         }
@@ -86,9 +92,9 @@ mod tests {
     #[test]
     fn a_mode_that_is_not_the_next_one_is_a_failure() {
         for (modes, why) in [
-            ("pssssps", "the task goes on to `p`"),
-            ("pssssaapssssaal", "after a step of a setpoint, the task goes on to `p`"),
-            ("pssssaa-", "after a step of a setpoint, the task goes on to `the end`"),
+            ("pssssps", "the mode `s` was left for `p`"),
+            ("pssssaapssssaal", "after a step of a setpoint, the mode `a` was left for `p`"),
+            ("pssssaa-", "after a step of a setpoint, the mode `a` was left for `the end`"),
             ("pssss", "the run ended in the mode `s`"),
         ] {
             assert_eq!(course(modes).1.as_deref(), Some(why), "{modes}");

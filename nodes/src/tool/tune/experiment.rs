@@ -57,11 +57,16 @@ impl Experiment<'_> {
     /// # Errors
     /// If the graph with the signal does not load.
     pub(super) fn run(&self, component: usize, amplitude: f64) -> Result<Answered, String> {
-        let request = Request {
-            set: [&self.request.set[..], &self.settings(component, amplitude)].concat(),
-            ..self.request.clone()
-        };
-        let compiled = compile(self.catalogue, &request).map_err(|report| self.refused(&report))?;
+        let settings = [&self.request.set[..], &self.settings(component, amplitude)].concat();
+        lift::unless_it_bounces(|lost| {
+            let set = settings.iter().cloned().chain(lost.setting(self.mode, &self.mode.name)).collect();
+            self.attempt(component, &Request { set, ..self.request.clone() })
+        })
+    }
+
+    /// Runs with a signal along a component. Also returns whether the pad has bounced at the first touch.
+    fn attempt(&self, component: usize, request: &Request) -> Result<(Answered, bool), String> {
+        let compiled = compile(self.catalogue, request).map_err(|report| self.refused(&report))?;
         let mut engine = Engine::new(compiled);
         let pid = self.feature.pid.as_deref().unwrap_or_default();
         let find = |engine: &Engine, name: String| {
@@ -87,20 +92,21 @@ impl Experiment<'_> {
         let mut values = rows.iter().skip(sines[0].begin).flatten();
         let is_absent = values.any(|value| !value.is_finite());
         let nothing = |why: String| Answered::Nothing { why, is_absent };
-        Ok(match (&outcome.end, left) {
+        let answered = match (&outcome.end, left) {
             (End::Interrupted, _) => Answered::Interrupted,
             (end, _) if rows.is_empty() => {
                 Answered::NotReached(format!("the task does not reach the mode `{}`: {end}", self.mode.name))
             }
             (End::Fault(fault), _) => nothing(fault.to_string()),
-            (_, Some(mode)) => nothing(format!("the mode `{}` was left for `{mode}`", self.mode.name)),
+            (_, Some(mode)) => nothing(lift::left(&self.mode.name, mode)),
             _ if rows.len() < wanted => {
                 let seconds = rows.len() as f64 * self.period;
                 nothing(format!("the mode `{}` lasted {seconds:.1} s only", self.mode.name))
             }
             _ if is_absent => nothing(format!("`{}` was absent for a while", self.feature.name)),
             _ => Answered::Lines(sines.iter().map(|sine| self.line(rows, sine)).collect(), limits.most()),
-        })
+        };
+        Ok((answered, stay.has_bounced()))
     }
 
     /// Returns why the graph with the signal does not load.

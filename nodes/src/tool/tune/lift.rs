@@ -8,32 +8,70 @@ use crate::tool::control::exits::{Exit, exits};
 
 /// The mode in which the sensor lifts off.
 pub(super) const MODE: &str = "tune_lift";
+/// The same after a contact that was lost.
+const LOST: &str = "tune_lost";
 /// How long it lifts off [s].
 pub(super) const LASTS_S: f64 = 2.0;
 /// How fast it lifts off [m/s].
 const SPEED: f64 = 0.015;
 
+/// Where a contact that is lost leads.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Lost {
+    /// To the lift: a bench that does not start again would else press on, until the run ends.
+    Lifts,
+    /// To the mode that the task names.
+    AsTheTaskSays,
+}
+
+impl Lost {
+    /// Returns the setting of a mode, here or a copy of it with another name.
+    pub(super) fn setting(self, mode: &OutlinedMode, name: &str) -> Option<String> {
+        (self == Self::Lifts && can_lose(mode)).then(|| format!("modes.{name}.on_lost.to={LOST:?}"))
+    }
+}
+
+/// Runs with a lift after a contact that is lost; `run` also says whether the pad has bounced at the first touch. The task
+/// then finds the contact again, so it runs once more as the task says.
+pub(super) fn unless_it_bounces<T, E>(run: impl Fn(Lost) -> Result<(T, bool), E>) -> Result<T, E> {
+    match run(Lost::Lifts)? {
+        (_, true) => run(Lost::AsTheTaskSays).map(|(seen, _)| seen),
+        (seen, false) => Ok(seen),
+    }
+}
+
+/// Returns how a mode ended that has gone on to another one.
+pub(super) fn left(mode: &str, to: &str) -> String {
+    match to {
+        LOST => "the contact was lost".to_owned(),
+        to => format!("the mode `{mode}` was left for `{to}`"),
+    }
+}
+
 /// Returns the settings that let a mode end after so long [s], whatever its exits `go` say, and lift the sensor off.
 /// Exits that fail, and those of a lost contact, stay.
 pub(super) fn settings(outline: &Outline, mode: &OutlinedMode, adder: &str, after_s: f64) -> Vec<String> {
-    let projectors = outline.nodes.iter().filter(|node| node.kind.text == "projector");
-    let free = projectors.map(|node| format!("modes.{MODE}.set.{}.select=[0, 0, 0, 0, 0, 0]", node.name));
-    let away = [
+    let mut set = vec![
         go(mode, MODE, after_s),
         format!("nodes.{MODE}_twist.type=twist_source"),
         format!("nodes.{MODE}_twist.twist=[0, 0, 0, 0, 0, 0]"),
         format!("nodes.{adder}.in.{MODE}={MODE}_twist.twist"),
-        format!("modes.{MODE}.set.{MODE}_twist.twist=[0, 0, {:?}, 0, 0, 0]", -SPEED),
-        format!("modes.{MODE}.done={{ after_ms = {:?} }}", LASTS_S * 1e3),
     ];
-    away.into_iter().chain(free).collect()
+    for lift in [Some(MODE), can_lose(mode).then_some(LOST)].into_iter().flatten() {
+        let projectors = outline.nodes.iter().filter(|node| node.kind.text == "projector");
+        set.extend(projectors.map(|node| format!("modes.{lift}.set.{}.select=[0, 0, 0, 0, 0, 0]", node.name)));
+        set.push(format!("modes.{lift}.set.{MODE}_twist.twist=[0, 0, {:?}, 0, 0, 0]", -SPEED));
+        set.push(format!("modes.{lift}.done={{ after_ms = {:?} }}", LASTS_S * 1e3));
+    }
+    set
 }
 
 /// Returns the setting that lets a mode go on to another one after so long [s], instead of its own exits `go`.
 pub(super) fn go(mode: &OutlinedMode, to: &str, after_s: f64) -> String {
     let mut exits = vec![after(to, after_s)];
     // The modes behind the exits stay reachable, by words that nobody sends.
-    exits.extend(targets(mode).iter().map(|to| format!("{{ to = {to:?}, on = \"{MODE}_{to}\" }}")));
+    let lost = can_lose(mode).then_some(LOST);
+    exits.extend(targets(mode).into_iter().chain(lost).map(|to| format!("{{ to = {to:?}, on = \"{MODE}_{to}\" }}")));
     format!("modes.{}.go=[{}]", mode.name, exits.join(", "))
 }
 
@@ -42,9 +80,14 @@ pub(super) fn after(to: &str, after_s: f64) -> String {
     format!("{{ to = {to:?}, after_ms = {:?}, priority = 1 }}", (after_s * 1e3).ceil())
 }
 
-/// Returns the modes to which the exits `go` of a mode lead.
+/// Returns the modes to which the exits `go` and `on_lost` of a mode lead.
 fn targets(mode: &OutlinedMode) -> BTreeSet<&str> {
-    exits(mode, "go").filter_map(Exit::to).collect()
+    ["go", "on_lost"].into_iter().flat_map(|key| exits(mode, key)).filter_map(Exit::to).collect()
+}
+
+/// Returns whether a mode ends when its contact is lost.
+fn can_lose(mode: &OutlinedMode) -> bool {
+    exits(mode, "on_lost").next().is_some()
 }
 
 #[cfg(test)]
@@ -65,9 +108,13 @@ mod tests {
             };
             let compiled = load(&request);
             for mode in &compiled.outline().modes {
-                let lift = settings(compiled.outline(), mode, "sum", 10.0);
-                let lifted = load(&Request { set: lift, ..request.clone() });
-                assert!(lifted.outline().modes.iter().any(|mode| mode.name == MODE), "{task}");
+                for lost in [Lost::Lifts, Lost::AsTheTaskSays] {
+                    let lift = settings(compiled.outline(), mode, "sum", 10.0).into_iter();
+                    let set = lift.chain(lost.setting(mode, &mode.name)).collect();
+                    let lifted = load(&Request { set, ..request.clone() });
+                    let has = |name: &str| lifted.outline().modes.iter().any(|mode| mode.name == name);
+                    assert_eq!((has(MODE), has(LOST)), (true, can_lose(mode)), "{task}");
+                }
                 with_exits += targets(mode).len();
             }
         }

@@ -45,6 +45,11 @@ impl<R> Stay<R> {
         &self.rows
     }
 
+    /// Returns whether the mode was left while the contact settled, and not entered again.
+    pub(super) const fn has_bounced(&self) -> bool {
+        self.left.is_some() && self.rows.len() <= self.settling
+    }
+
     /// Returns the mode to which the task went before there were enough rows.
     pub(super) fn left(&self) -> Option<&str> {
         self.left.as_deref()
@@ -57,12 +62,18 @@ mod tests {
 
     /// Returns the ticks that count of a task that is in these modes, and the mode to which it went too early.
     fn stay(modes: &str) -> (Vec<usize>, Option<String>) {
+        let stay = seen(modes);
+        (stay.rows().to_vec(), stay.left().map(str::to_owned))
+    }
+
+    /// Follows a task that is in these modes.
+    fn seen(modes: &str) -> Stay<usize> {
         let mut stay = Stay::new("s".to_owned(), 3, 6);
         for (tick, mode) in modes.char_indices() {
             let mode = mode.to_string();
             stay.see((mode != "-").then_some(&mode), || tick);
         }
-        (stay.rows().to_vec(), stay.left().map(str::to_owned))
+        stay
     }
 
     #[test]
@@ -70,6 +81,14 @@ mod tests {
         for (modes, rows) in [("ppssssssss", 2..8), ("pssspssssssss", 5..11), ("spspssssss", 4..10), ("ssssssll", 0..6)]
         {
             assert_eq!(stay(modes), (rows.collect(), None), "{modes}");
+        }
+    }
+
+    #[test]
+    fn a_pad_has_bounced_if_the_mode_is_left_while_the_contact_settles_and_not_entered_again() {
+        for (modes, bounced) in [("pssl", true), ("psssl", true), ("pssssl", false), ("psspss", false), ("ppp", false)]
+        {
+            assert_eq!(seen(modes).has_bounced(), bounced, "{modes}");
         }
     }
 

@@ -3,7 +3,7 @@
 use serde::Serialize;
 use tactflow_runtime::graph::{Outline, OutlinedMode};
 
-use super::lift;
+use super::lift::{self, Lost};
 use crate::tool::control::digits::to_three_digits;
 use crate::tool::control::law::{Feature, setpoint};
 use crate::tool::control::nodes::{Index, Nodes, mode_flag, toml};
@@ -188,6 +188,7 @@ pub(super) fn settings(mode: &OutlinedMode, features: &[&Feature], steps: &[Opti
         let kept = mode.settings.iter().filter(|setting| setting.path != "go" && setting.path != "done");
         set.extend(kept.map(|setting| format!("modes.{name}.{}={}", setting.path, toml(setting))));
         set.push(format!("modes.{name}.go=[{}]", lift::after(next, LASTS_S)));
+        set.extend(Lost::Lifts.setting(mode, name));
         let node = feature.compared.as_deref().unwrap_or_default();
         let key = format!("{node}.setpoint.{}", feature.name);
         stepped.retain(|(other, _)| *other != key);

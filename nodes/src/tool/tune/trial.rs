@@ -58,9 +58,21 @@ impl<'a> Trial<'a> {
         steps: &[Option<Planned>],
         gains: &[String],
     ) -> Result<Run<Seen>, Stop> {
-        let set = [&self.request.set[..], gains, &step::settings(self.mode, features, steps)].concat();
-        let request = Request { set, ..self.request.clone() };
-        let compiled = compile(self.catalogue, &request).map_err(|report| report.render(false))?;
+        let settings = [&self.request.set[..], gains, &step::settings(self.mode, features, steps)].concat();
+        lift::unless_it_bounces(|lost| {
+            let set = settings.iter().cloned().chain(lost.setting(self.mode, &self.mode.name)).collect();
+            self.attempt(features, steps, &Request { set, ..self.request.clone() })
+        })
+    }
+
+    /// Runs a request through steps of its features. Also returns whether the pad has bounced at the first touch.
+    fn attempt(
+        &self,
+        features: &[&Feature],
+        steps: &[Option<Planned>],
+        request: &Request,
+    ) -> Result<(Run<Seen>, bool), Stop> {
+        let compiled = compile(self.catalogue, request).map_err(|report| report.render(false))?;
         let period = compiled.outline().period_s;
         let mut engine = Engine::new(compiled);
         let ports = features.iter().map(|feature| {
@@ -96,7 +108,7 @@ impl<'a> Trial<'a> {
                 after: column(course.rows(&step::mode_name(i))),
             }
         });
-        Ok(Run { each: seen.collect(), failure, limited: limits.most() })
+        Ok((Run { each: seen.collect(), failure, limited: limits.most() }, course.has_bounced()))
     }
 }
 
