@@ -57,11 +57,8 @@ impl Experiment<'_> {
     /// # Errors
     /// If the graph with the signal does not load.
     pub(super) fn run(&self, component: usize, amplitude: f64) -> Result<Answered, String> {
-        let settings = [&self.request.set[..], &self.settings(component, amplitude)].concat();
-        lift::unless_it_bounces(|lost| {
-            let set = settings.iter().cloned().chain(lost.setting(self.mode, &self.mode.name)).collect();
-            self.attempt(component, &Request { set, ..self.request.clone() })
-        })
+        let settings = self.settings(component, amplitude);
+        lift::unless_it_bounces(self.request, &settings, self.mode, |request| self.attempt(component, request))
     }
 
     /// Runs with a signal along a component. Also returns whether the pad has bounced at the first touch.

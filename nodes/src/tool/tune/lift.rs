@@ -2,7 +2,7 @@
 
 use std::collections::BTreeSet;
 
-use tactflow_runtime::graph::{Outline, OutlinedMode};
+use tactflow_runtime::graph::{Outline, OutlinedMode, Request};
 
 use crate::tool::control::exits::{Exit, exits};
 
@@ -31,11 +31,21 @@ impl Lost {
     }
 }
 
-/// Runs with a lift after a contact that is lost; `run` also says whether the pad has bounced at the first touch. The task
-/// then finds the contact again, so it runs once more as the task says.
-pub(super) fn unless_it_bounces<T, E>(run: impl Fn(Lost) -> Result<(T, bool), E>) -> Result<T, E> {
-    match run(Lost::Lifts)? {
-        (_, true) => run(Lost::AsTheTaskSays).map(|(seen, _)| seen),
+/// Runs a request with these settings too, with a lift after a contact that is lost. `run` also says whether the pad has
+/// bounced at the first touch: the task then finds the contact again, so it runs once more as the task says.
+pub(super) fn unless_it_bounces<T, E>(
+    request: &Request,
+    settings: &[String],
+    mode: &OutlinedMode,
+    run: impl Fn(&Request) -> Result<(T, bool), E>,
+) -> Result<T, E> {
+    let with = |lost: Lost| {
+        let settings = settings.iter().cloned().chain(lost.setting(mode, &mode.name));
+        let set = request.set.iter().cloned().chain(settings).collect();
+        run(&Request { set, ..request.clone() })
+    };
+    match with(Lost::Lifts)? {
+        (_, true) => with(Lost::AsTheTaskSays).map(|(seen, _)| seen),
         (seen, false) => Ok(seen),
     }
 }
@@ -49,7 +59,7 @@ pub(super) fn left(mode: &str, to: &str) -> String {
 }
 
 /// Returns the settings that let a mode end after so long [s], whatever its exits `go` say, and lift the sensor off.
-/// Exits that fail, and those of a lost contact, stay.
+/// The exit `fail` stays. A lost contact leads where [`Lost`] says.
 pub(super) fn settings(outline: &Outline, mode: &OutlinedMode, adder: &str, after_s: f64) -> Vec<String> {
     let mut set = vec![
         go(mode, MODE, after_s),
@@ -92,7 +102,7 @@ fn can_lose(mode: &OutlinedMode) -> bool {
 
 #[cfg(test)]
 mod tests {
-    use tactflow_runtime::graph::{Request, compile};
+    use tactflow_runtime::graph::compile;
 
     use super::*;
 

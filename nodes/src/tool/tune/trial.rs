@@ -58,11 +58,8 @@ impl<'a> Trial<'a> {
         steps: &[Option<Planned>],
         gains: &[String],
     ) -> Result<Run<Seen>, Stop> {
-        let settings = [&self.request.set[..], gains, &step::settings(self.mode, features, steps)].concat();
-        lift::unless_it_bounces(|lost| {
-            let set = settings.iter().cloned().chain(lost.setting(self.mode, &self.mode.name)).collect();
-            self.attempt(features, steps, &Request { set, ..self.request.clone() })
-        })
+        let settings = [gains, &step::settings(self.mode, features, steps)].concat();
+        lift::unless_it_bounces(&self.request, &settings, self.mode, |request| self.attempt(features, steps, request))
     }
 
     /// Runs a request through steps of its features. Also returns whether the pad has bounced at the first touch.
