@@ -74,7 +74,7 @@ fn correct<'k>(
         let only = candidates.first().filter(|_| is_only && count(wanted) > 1);
         let Some(&i) = close.or(only) else { continue };
         let is_invalid = !is_name(&names[i]);
-        if is_invalid || count(wanted) > 1 || sources.is_misspelt(&names[i], wanted) {
+        if is_invalid || sources.is_misspelt(&names[i], wanted) {
             let message = if is_invalid {
                 format!("`{}` is not a valid name", names[i])
             } else {
