@@ -37,6 +37,20 @@ pub struct Outline {
     /// The facts that the bench states, `role.fact`, with their places.
     #[serde(skip)]
     pub facts: Vec<(String, Value)>,
+    /// The parameters that may change while the graph runs.
+    #[serde(skip)]
+    pub live: Vec<OutlinedRange>,
+}
+
+/// A parameter that may change while the graph runs.
+#[derive(Debug, Clone)]
+pub struct OutlinedRange {
+    /// Its name: `node.param`.
+    pub name: String,
+    /// Its largest value, in its unit.
+    pub max: f64,
+    /// Where that is written.
+    pub span: Range<usize>,
 }
 
 /// A word of a graph file.

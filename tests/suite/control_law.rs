@@ -121,7 +121,7 @@ fn every_shipped_task_is_explained_for_a_person_and_for_a_page() {
     let page = say(&["explain", "graphs/hybrid.toml"]).out;
     for text in [
         "in the mode `servo`",
-        "-3.5",
+        "-3.3",
         "`pid` lets the control of `x` grow by at most 0.25 m/s2",
         "At rest: wx, wy, wz.",
         "`move.contact` (`contact_limit`)",
@@ -163,10 +163,10 @@ fn loops(args: &[&str]) -> Vec<Value> {
 fn margins_are_those_of_geometry_and_of_the_contacts_that_the_bench_states() {
     let alone = loops(&["graphs/hybrid.toml", "--set", "facts.arm.contacts=[]"]);
     let [x, _, pressure] = &alone[..] else { panic!("{alone:?}") };
-    // An integrator with a gain of 3.5 1/s.
+    // An integrator with a gain of 3.3 1/s.
     let crossover = x["margins"]["crossover_hz"].as_f64().unwrap();
-    assert!((crossover - 3.5 / std::f64::consts::TAU).abs() < 1e-3, "{crossover}");
-    assert!((x["margins"]["ramp_lag_s"].as_f64().unwrap() - 1.0 / 3.5).abs() < 1e-9);
+    assert!((crossover - 3.3 / std::f64::consts::TAU).abs() < 1e-3, "{crossover}");
+    assert!((x["margins"]["ramp_lag_s"].as_f64().unwrap() - 1.0 / 3.3).abs() < 1e-9);
     assert_eq!((&x["object"], &pressure["margins"]), (&Value::Null, &Value::Null));
     let ball = r#"{ object = "ball", pressure = { vz = 10.0, resonance_hz = 2.4, damping_ratio = 0.35 } }"#;
     let stiff = "pressure = { vz = 17.0, resonance_hz = 5.0, damping_ratio = 0.3 }";
@@ -176,9 +176,9 @@ fn margins_are_those_of_geometry_and_of_the_contacts_that_the_bench_states() {
     assert_eq!(both.len(), 6);
     let phase = |one: &Value| one["margins"]["phase_deg"].as_f64().unwrap();
     assert!(both.iter().all(|one| one["margins"]["is_stable"] == true && phase(one) > 20.0), "{both:?}");
-    // The schedule divides the gain by the larger answer, and of x the latency costs margin: 3.5 1/s times 20 ms.
+    // The schedule divides the gain by the larger answer, and of x the latency costs margin: 3.3 1/s times 20 ms.
     assert!(phase(&both[2]) < phase(&both[5]));
-    assert!((phase(&both[0]) - phase(&both[3]) - (3.5 * 0.02_f64).to_degrees()).abs() < 0.1);
+    assert!((phase(&both[0]) - phase(&both[3]) - (3.3 * 0.02_f64).to_degrees()).abs() < 0.1);
     let page = say(&[&["explain"], &args[..]].concat()).out;
     assert!(page.contains("The worst loop is that of `pressure` over `"), "{page}");
 }

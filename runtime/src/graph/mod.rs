@@ -17,8 +17,8 @@ mod plan;
 mod syntax;
 
 pub use crate::outline::{
-    NO_SPAN, Outline, OutlinedBlock, OutlinedMode, OutlinedPort, OutlinedRole, OutlinedTask, OutlinedWire,
-    OutlinedWord, Setting, ValueOrigin,
+    NO_SPAN, Outline, OutlinedBlock, OutlinedMode, OutlinedPort, OutlinedRange, OutlinedRole, OutlinedTask,
+    OutlinedWire, OutlinedWord, Setting, ValueOrigin,
 };
 pub use bench::{BenchDevice, CommissionedDevice, OpenBench, open_bench};
 pub use compile::compile;

@@ -8,11 +8,11 @@ use crate::graph::bench::{OpenedBench, fill_facts};
 use crate::graph::load::{MeasuredValues, Task};
 use crate::graph::net::{CommandWire, Net, Wire, WireOrigin};
 use crate::graph::plan::{PlannedNode, PlannedPort, PortRef};
-use crate::graph::syntax::{Block, GraphTable, LIMITS, PolicyTable};
+use crate::graph::syntax::{Block, GraphTable, LIMITS, LiveEntry, PolicyTable};
 use crate::node::{FilePath, Param, ParamSpec, Repeats, Spanned};
 use crate::outline::{
-    NO_SPAN, Outline, OutlinedBlock, OutlinedMode, OutlinedPort, OutlinedRole, OutlinedTask, OutlinedWire,
-    OutlinedWord, Setting, ValueOrigin,
+    NO_SPAN, Outline, OutlinedBlock, OutlinedMode, OutlinedPort, OutlinedRange, OutlinedRole, OutlinedTask,
+    OutlinedWire, OutlinedWord, Setting, ValueOrigin,
 };
 use crate::signal::Shape;
 use crate::source::{Diagnostics, Item, Key, SourceMap, Table, Value, parse_table};
@@ -49,6 +49,7 @@ impl OutlineBuilder<'_> {
             nodes: self.nodes.iter().filter_map(|node| self.node(node)).collect(),
             devices: self.devices(),
             facts: self.facts(),
+            live: flat.live.iter().map(outlined_range).collect(),
         }
     }
 
@@ -288,6 +289,11 @@ impl OutlineBuilder<'_> {
             }
         }
     }
+}
+
+fn outlined_range(entry: &LiveEntry) -> OutlinedRange {
+    let Spanned { value: max, span } = entry.range.max.clone();
+    OutlinedRange { name: entry.name.value.clone(), max, span }
 }
 
 fn outlined_port(port: &PlannedPort) -> OutlinedPort {

@@ -37,7 +37,7 @@ impl Usual {
         }
         let range = range.filter(|range| number.is_finite() && !range.contains(number))?;
         let unit = unit.replace('2', "²");
-        let message = format!("`{name}` is {number} {unit}, but usual is {}", in_words(&range, &unit));
+        let message = format!("`{name}` is {}, but usual is {}", with_unit(number, &unit), in_words(&range, &unit));
         let help = match converted(number, &unit).filter(|(number, _)| range.contains(*number)) {
             Some((converted, other)) => {
                 format!("if {number} is in {other}, write `{converted}`")
@@ -55,12 +55,17 @@ pub(crate) fn shortest(time: f64, period: f64) -> Option<f64> {
     (time > 0.0 && time < period * (1.0 - 1e-6)).then(|| (period * 1e3).round() / 1e3)
 }
 
+/// Returns a number with its unit; that of a ratio is none.
+fn with_unit(number: f64, unit: &str) -> String {
+    if matches!(unit, "" | "1") { number.to_string() } else { format!("{number} {unit}") }
+}
+
 /// Returns the range in words: `at most 3 m/s`.
 fn in_words(&Bounds { min, max, .. }: &Bounds, unit: &str) -> String {
     match (min.is_finite(), max.is_finite()) {
-        (true, true) => format!("{min} to {max} {unit}"),
-        (true, false) => format!("at least {min} {unit}"),
-        _ => format!("at most {max} {unit}"),
+        (true, true) => format!("{min} to {}", with_unit(max, unit)),
+        (true, false) => format!("at least {}", with_unit(min, unit)),
+        _ => format!("at most {}", with_unit(max, unit)),
     }
 }
 

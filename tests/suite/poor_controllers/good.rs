@@ -1,6 +1,6 @@
 //! Controllers as an integrator may write them.
 
-use super::poor::HALF_TURN;
+use super::columns::HALF_TURN;
 use super::variant::{Variant, cleared, compared, graph, search, variant};
 
 /// The lines of all gains of a task, with each `kp` and `ki` times a factor.
@@ -69,8 +69,8 @@ pub(super) fn good_behind_nodes() -> Vec<Variant> {
 pub(super) fn good() -> Vec<Variant> {
     let mut all = Vec::new();
     for task in ["hybrid", "edge", "explore", "rolling", "cable", "force", "position", "seek_ridge", "square"] {
-        // Those of `hybrid` are already the largest that `tune` proposes.
-        for factor in [0.3, 0.6, 0.9, if task == "hybrid" { 1.0 } else { 1.2 }] {
+        // Those of `hybrid` and `position` are already the largest that keep the margins.
+        for factor in [0.3, 0.6, 0.9, if matches!(task, "hybrid" | "position") { 1.0 } else { 1.2 }] {
             all.push(Variant { task, bench: None, changes: scaled(task, factor) });
         }
     }
@@ -89,7 +89,7 @@ pub(super) fn good() -> Vec<Variant> {
         variant("edge", &["setpoint = { pressure = 0.1, orientation = -0.7 }"]),
         variant("force", &["setpoint = { pressure = 1.0 }"]),
         // Other signs and scales of the same motion.
-        variant("hybrid", &["gains.x = { kp = 1.75 }", "columns.x = [-2, 0, 0, 0, 0, 0]"]),
+        variant("hybrid", &["gains.x = { kp = 1.65 }", "columns.x = [-2, 0, 0, 0, 0, 0]"]),
         variant("hybrid", &["columns.x = [-1, 0, 0, 0, 20, 0]"]),
         variant("rolling", &["columns.x = [-1, 0, 0, 0, -5, 0]", "columns.y = [0, -1, 0, 5, 0, 0]"]),
         // Features left out, with their columns.
@@ -109,7 +109,7 @@ pub(super) fn good() -> Vec<Variant> {
         variant("cable", &["select = [1, 0, 1, 0, 1, 1]"]),
         variant("edge", &["select = [1, 1, 1, 1, 1, 1]"]),
         variant("rolling", &["select = [0, 0, 1, 1, 1, 0]"]),
-        variant("hybrid", &["gains.x = { kp = 3.5, kd = 0.005 }"]),
+        variant("hybrid", &["gains.x = { kp = 3.3, kd = 0.005 }"]),
         // A task that creeps first and then approaches.
         Variant { task: "hybrid", bench: None, changes: cleared("0.002") },
         // Modes that lead to each other with a gap, or after a while.

@@ -1,6 +1,6 @@
 //! Controllers with one mistake, each with the code of its warning.
 
-use super::variant::{Variant, cleared, compared, gated, on, search, variant};
+use super::variant::{Variant, cleared, compared, gated, on, search, variant, with_feature};
 
 /// Mistakes that nodes between the feature and the motion hide from a first look.
 pub(super) fn poor_behind_nodes() -> Vec<(&'static str, Variant)> {
@@ -31,125 +31,25 @@ pub(super) fn poor_behind_nodes() -> Vec<(&'static str, Variant)> {
                 ],
             ),
         ),
+        // One side of a switch is smooth.
+        (
+            "unfiltered-derivative",
+            with(
+                vec!["gains.x = { kp = 2.0, kd = 0.1 }".to_owned()],
+                &[
+                    "set nodes.slow.type=\"low_pass\"",
+                    "set nodes.slow.in.value=\"touch.x\"",
+                    "set nodes.slow.time_constant_ms=20",
+                    "set nodes.held.type=\"switch\"",
+                    "set nodes.held.in.on=\"touch.x\"",
+                    "set nodes.held.in.off=\"slow.value\"",
+                    "set nodes.held.in.select=\"touch.present\"",
+                    "set nodes.error.in.x=\"held.value\"",
+                ],
+            ),
+        ),
         ("unused-column", with(feature("modes.approach"), &[])),
     ]
-}
-
-/// Columns that move the sensor the wrong way, or along the wrong axis.
-pub(super) fn wrong_columns() -> Vec<(&'static str, Variant)> {
-    let cases = [
-        variant("hybrid", &["columns.x = [1, 0, 0, 0, 20, 0]"]),
-        variant("hybrid", &["columns.y = [0, 1, 0, -20, 0, 0]"]),
-        variant("hybrid", &["columns.pressure = [0, 0, -1, 0, 0, 0]"]),
-        variant(
-            "hybrid",
-            &[
-                "columns.y = [0, -1, 0, 0, 0, 0]",
-                "columns.pressure = [0, 0, 0, 1, 0, 0]",
-                "select = [1, 1, 0, 1, 0, 0]",
-            ],
-        ),
-        variant("hybrid", &["columns.x = [0, -1, 0, 20, 0, 0]", "columns.y = [-1, 0, 0, 0, -20, 0]"]),
-        variant("hybrid", &["columns.x = [0, -1, 0, 20, 0, 0]"]),
-        variant("edge", &["columns.orientation = [0, 0, 0, 0, 0, 1]"]),
-        variant("edge", &["columns.pressure = [0, 0, 0, 0, 0, -1]", "columns.orientation = [0, 0, 1, 0, 0, 0]"]),
-        variant("rolling", &["columns.x = [-1, 0, 0, 0, 20, 0]"]),
-        // As the paper prints it.
-        variant("rolling", &["columns.y = [0, -1, 0, -20, 0, 0]"]),
-        variant("force", &["columns.pressure = [0, 0, -1, 0, 0, 0]"]),
-        variant("cable", &["columns.orientation = [0, 0, 0, 0, 0, 1]"]),
-        variant("cable", &["columns.x = [0, 0, 0, 0, 0, -1]", "columns.orientation = [-1, 0, 0, 0, -20, 0]"]),
-        variant("explore", &["columns.x = [1, 0, 0, 0, -20, 0]"]),
-        variant("seek_ridge", &["columns.y = [0, 1, 0, 20, 0, 0]"]),
-        variant("position", &["columns.y = [0, 1, 0, 20, 0, 0]"]),
-        variant("square", &["columns.pressure = [0, 0, -1, 0, 0, 0]"]),
-        variant("finger_press", &["columns.pressure = [0, 0, -0.0005, 0, 0, 0]"]),
-        variant("two_arms", &["set parts.left.set.jacobian.columns.x=[1, 0, 0, 0, 20, 0]"]),
-        variant("carry", &["set parts.left.set.jacobian.columns.force=[0, 0, -0.004, 0, 0, 0]"]),
-        // Turned by 80 degrees, turned by 100 degrees, rolled along the other axis, and slid instead of pressed.
-        variant("hybrid", &["columns.x = [-0.17, -0.98, 0, 0, 0, 0]"]),
-        variant("hybrid", &["columns.x = [0, -0.98, 0, 0, 0, 0]", "columns.y = [0.98, 0, 0, 0, 0, 0]"]),
-        variant("rolling", &["columns.x = [-1, 0, 0, -20, 0, 0]"]),
-        variant("hybrid", &["columns.pressure = [3, 0, 1, 0, 0, 0]"]),
-    ];
-    cases.into_iter().map(|variant| ("wrong-column", variant)).collect()
-}
-
-/// Columns that are wrong for lines, areas and drags, and behind a mount.
-pub(super) fn more_wrong_columns() -> Vec<(&'static str, Variant)> {
-    let cases = [
-        // The offset of a line grows toward its direction turned by 90 degrees: here along -x.
-        with_feature(
-            "cable",
-            "offset",
-            "line2.offset",
-            "[-1, 0, 0, 0, 0, 0]",
-            &[
-                "set nodes.line2.type=\"hough\"",
-                "set nodes.line2.in.image=\"touch.repaired\"",
-                "set nodes.line2.in.region=\"middle.region\"",
-                "set nodes.error.setpoint.orientation=1.2",
-                "select = [1, 0, 1, 0, 0, 1]",
-            ],
-        ),
-        with_feature(
-            "hold_without_slip",
-            "torque",
-            "shear.torque",
-            "[0, 0, 0, 0, 0, 1]",
-            &["select = [0, 0, 1, 0, 0, 1]"],
-        ),
-        // A pad that is mounted half a turn about z.
-        variant("hybrid", &HALF_TURN),
-        // Where the direction wraps, no column is right.
-        with_feature(
-            "edge",
-            "offset",
-            "line2.offset",
-            "[1, 0, 0, 0, 0, 0]",
-            &[
-                "set nodes.line2.type=\"hough\"",
-                "set nodes.line2.in.image=\"touch.repaired\"",
-                "set nodes.line2.in.region=\"touch.region\"",
-                "select = [1, 0, 1, 0, 0, 1]",
-            ],
-        ),
-        with_feature("hold_without_slip", "fx", "shear.fx", "[0.01, 0, 0, 0, 0, 0]", &["select = [1, 0, 1, 0, 0, 0]"]),
-        with_feature(
-            "edge",
-            "area",
-            "size.area",
-            "[0, 0, -0.001, 0, 0, 0]",
-            &[
-                "set nodes.size.type=\"contact_area\"",
-                "set nodes.size.in.image=\"touch.repaired\"",
-                "set nodes.size.in.region=\"touch.region\"",
-            ],
-        ),
-    ];
-    cases.into_iter().map(|variant| ("wrong-column", variant)).collect()
-}
-
-/// The motion of the features passes a mount that is turned by half a turn about z.
-pub(super) const HALF_TURN: [&str; 6] = [
-    "set nodes.mount.type=\"static_pose\"",
-    "set nodes.mount.rpy=[0, 0, 3.14159265]",
-    "set nodes.turned.type=\"adjoint\"",
-    "set nodes.turned.in.twist=\"projector.twist\"",
-    "set nodes.turned.in.pose=\"mount.pose\"",
-    "set nodes.sum.in.touch=\"turned.twist\"",
-];
-
-/// A task that controls a feature more, with a setpoint of 0 and a gain of 1 1/s.
-fn with_feature(task: &'static str, name: &str, port: &str, column: &str, changes: &[&str]) -> Variant {
-    let more = [
-        format!("set nodes.error.in.{name}={port:?}"),
-        format!("set nodes.error.setpoint.{name}=0.0"),
-        format!("set nodes.pid.gains.{name}.kp=1.0"),
-        format!("set nodes.jacobian.columns.{name}={column}"),
-    ];
-    let changes = changes.iter().map(|change| (*change).to_owned()).chain(more).collect();
-    Variant { task, bench: None, changes }
 }
 
 /// Forces, places and errors that a mode never reaches, and loops that never get there.
@@ -254,7 +154,7 @@ pub(super) fn poor_gains() -> Vec<(&'static str, Variant)> {
         ("windup", variant("hybrid", &["gains.pressure = { kp = 0.5, ki = 0.1 }"])),
         ("windup", on("pen", variant("force", &["gains.pressure = { kp = 0.5, ki = 0.1 }"]))),
         ("windup", variant("edge", &["gains.orientation = { kp = 6.0, ki = 6.0 }"])),
-        ("windup", variant("hybrid", &["gains.x = { kp = 3.5, ki = 1.0, limit = 0.2 }"])),
+        ("windup", variant("hybrid", &["gains.x = { kp = 3.3, ki = 1.0, limit = 0.2 }"])),
         ("windup", variant("hybrid", &["gains.pressure = { kp = 0.5, ki = 0.1, within = 5.0 }"])),
         ("unstable-gain", variant("hybrid", &["gains.x = { kp = 600.0 }"])),
         // By the sampling alone: 1.2 times the error in each period.
@@ -434,11 +334,6 @@ pub(super) fn opposed() -> Vec<(&'static str, Variant)> {
         ),
         // It rests 2.9 mm beside the middle.
         ("opposed-motion", variant("hybrid", &["set modes.servo.set.reach.twist=[0.01, 0, 0, 0, 0, 0]"])),
-        // The line is turned to y, and longer than the pad.
-        (
-            "line-position",
-            with_feature("edge", "y", "touch.y", "[0, -1, 0, 0, 0, 0]", &["select = [0, 1, 1, 0, 0, 1]"]),
-        ),
         // The motion of the approach passes a projector that selects nothing then.
         (
             "no-approach",
@@ -453,5 +348,44 @@ pub(super) fn opposed() -> Vec<(&'static str, Variant)> {
                 ],
             ),
         ),
+    ]
+}
+
+/// What only a second look at the modes, the nodes or `[live]` shows.
+pub(super) fn at_second_sight() -> Vec<(&'static str, Variant)> {
+    vec![
+        // The line is turned to y, and longer than the pad.
+        (
+            "line-position",
+            with_feature("edge", "y", "touch.y", "[0, -1, 0, 0, 0, 0]", &["select = [0, 1, 1, 0, 0, 1]"]),
+        ),
+        // Also if the mode ends by itself, after a time in which the sensor moves on.
+        (
+            "line-position",
+            with_feature(
+                "edge",
+                "y",
+                "touch.y",
+                "[0, -1, 0, 0, 0, 0]",
+                &["select = [0, 1, 1, 0, 0, 1]", "set modes.servo.done={ after_ms = 9000 }"],
+            ),
+        ),
+        // Without a threshold there is no interpolated area.
+        (
+            "unused-column",
+            with_feature(
+                "hybrid",
+                "area",
+                "size.interpolated",
+                "[0, 0, 0.1, 0, 0, 0]",
+                &[
+                    "set nodes.size.type=\"contact_area\"",
+                    "set nodes.size.in.image=\"touch.repaired\"",
+                    "set nodes.size.in.region=\"touch.region\"",
+                ],
+            ),
+        ),
+        // What an operator may set while the arm moves.
+        ("low-margin", variant("hybrid", &["set live.pid.gains.y.kp.max=20.0"])),
     ]
 }

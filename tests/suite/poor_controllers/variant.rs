@@ -117,3 +117,15 @@ pub(super) fn compared(bound: &str) -> [&str; 7] {
         "set modes.eased.on_lost={ of = \"touch.present\", after_ms = 100, to = \"approach\" }",
     ]
 }
+
+/// A task that controls a feature more, with a setpoint of 0 and a gain of 1 1/s.
+pub(super) fn with_feature(task: &'static str, name: &str, port: &str, column: &str, changes: &[&str]) -> Variant {
+    let more = [
+        format!("set nodes.error.in.{name}={port:?}"),
+        format!("set nodes.error.setpoint.{name}=0.0"),
+        format!("set nodes.pid.gains.{name}.kp=1.0"),
+        format!("set nodes.jacobian.columns.{name}={column}"),
+    ];
+    let changes = changes.iter().map(|change| (*change).to_owned()).chain(more).collect();
+    Variant { task, bench: None, changes }
+}

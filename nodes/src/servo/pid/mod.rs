@@ -100,7 +100,7 @@ impl Gains {
         };
         let negative = [("kp", self.kp), ("ki", self.ki), ("kd", self.kd)].into_iter().find(|(_, value)| *value < 0.0);
         if let Some((gain, value)) = negative {
-            let message = format!("the gain `{gain}` of `{name}` is {value}: it increases the error");
+            let message = format!("the gain `{gain}` of `{name}` is {value}: it turns the motion of its column around");
             let help = format!("write `{gain} = {}`, and check that the column of `{name}` reduces its error", -value);
             return Some(warn(Code::UnusualGain, gain, message)?.help(help));
         }

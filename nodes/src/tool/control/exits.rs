@@ -41,6 +41,12 @@ impl<'a> Exit<'a> {
         self.entry(key)?.read()
     }
 
+    /// Returns the time for which it waits whatever the ports say [ms]; 0 if it waits for something else too, or first.
+    pub(crate) fn waits(self) -> f64 {
+        let others = ["when", "after_travel_mm"].iter().any(|key| self.entry(key).is_some());
+        self.number("after_ms").filter(|_| !others).unwrap_or_default()
+    }
+
     /// Returns whether it waits until there is no contact.
     pub(crate) fn is_lost(self) -> bool {
         self.is_of_contact() && matches!(self.word("is"), Some("false" | "absent"))

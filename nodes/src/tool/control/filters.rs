@@ -27,12 +27,24 @@ pub(crate) struct Way {
     pub(crate) filters: Vec<Filter>,
     /// The flags without which the feature does not pass.
     pub(crate) gates: Vec<String>,
+    /// By how much less a side of a switch smooths than the filters here [s].
+    pub(crate) spared_s: f64,
 }
 
 impl Way {
     fn delay(&self) -> f64 {
         self.filters.iter().map(|filter| filter.delay_s).sum()
     }
+
+    /// Returns the delay of the filters that smooth, on the side that smooths least [s].
+    fn least_smoothing(&self) -> f64 {
+        smoothing(&self.filters) - self.spared_s
+    }
+}
+
+/// Returns the delay of the filters that smooth [s].
+pub(crate) fn smoothing(filters: &[Filter]) -> f64 {
+    filters.iter().filter(|filter| filter.shape.smooths()).map(|filter| filter.delay_s).sum()
 }
 
 /// Follows a feature back to its measurement.
@@ -73,7 +85,9 @@ fn follow<'a>(nodes: &Nodes<'a>, port: &str, path: &mut Vec<&'a str>) -> Option<
 fn slower(sides: Vec<Way>) -> Option<Way> {
     let is_everywhere = |gate: &String| sides.iter().all(|side| side.gates.contains(gate));
     let slowest = sides.iter().max_by(|one, other| one.delay().total_cmp(&other.delay()))?;
+    let least = sides.iter().map(Way::least_smoothing).fold(f64::INFINITY, f64::min);
     Some(Way {
+        spared_s: smoothing(&slowest.filters) - least,
         measured: slowest.measured.clone(),
         filters: slowest.filters.clone(),
         gates: slowest.gates.iter().filter(|gate| is_everywhere(gate)).cloned().collect(),

@@ -4,7 +4,7 @@ use serde::Serialize;
 use tactflow_runtime::graph::OutlinedBlock;
 
 use super::contacts::Contact;
-use super::filters::{Filter, way};
+use super::filters::{Filter, smoothing, way};
 use super::nodes::{Nodes, source};
 use super::schedule::Schedule;
 
@@ -47,6 +47,9 @@ pub(crate) struct Feature {
     pub(crate) period_s: f64,
     /// Filters from the measurement to the motion.
     pub(crate) filters: Vec<Filter>,
+    /// By how much less the sides of switches smooth that are not followed [s].
+    #[serde(skip)]
+    pub(crate) spared_s: f64,
     /// The flags without which it moves nothing.
     #[serde(skip)]
     pub(crate) gates: Vec<String>,
@@ -207,7 +210,12 @@ impl Feature {
 
     /// Returns the delay of the filters that smooth it [s].
     pub(crate) fn smoothing(&self) -> f64 {
-        self.filters.iter().filter(|filter| filter.shape.smooths()).map(|filter| filter.delay_s).sum()
+        smoothing(&self.filters)
+    }
+
+    /// Returns the same for the sides of its switches that smooth least [s].
+    pub(crate) fn least_smoothing(&self) -> f64 {
+        self.smoothing() - self.spared_s
     }
 
     /// Returns the delay of all filters [s].
@@ -242,6 +250,7 @@ pub(super) fn feature<'a>(nodes: &Nodes<'a>, jacobian: &'a OutlinedBlock, name: 
         .map_or(nodes.period(), |(error, port)| nodes.writer(port).map_or(error.sample_s, |node| node.sample_s));
     let way = port.map(|port| way(nodes, port));
     let measured = way.as_ref().map(|way| way.measured.clone());
+    let spared_s = way.as_ref().map_or(0.0, |way| way.spared_s);
     let (filters, gates) = way.map(|way| (way.filters, way.gates)).unwrap_or_default();
     let (sides, mount) = (Vec::new(), None);
     let [kp, ki, kd] = ["kp", "ki", "kd"].map(|which| number(which).unwrap_or(0.0));
@@ -261,6 +270,7 @@ pub(super) fn feature<'a>(nodes: &Nodes<'a>, jacobian: &'a OutlinedBlock, name: 
         setpoint,
         period_s,
         filters,
+        spared_s,
         gates,
         mount,
         sides,

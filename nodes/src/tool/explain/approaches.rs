@@ -14,7 +14,8 @@ pub(super) struct Approach {
     pub(super) node: String,
     /// Speed of the sensor [m/s].
     pub(super) speed_m_per_s: f64,
-    /// Time until the arm follows a command: two periods, and the largest latency of a contact [s].
+    /// Time until the arm follows a command: two periods, and the largest latency with which a contact answers a motion in this
+    /// direction [s].
     pub(super) reaction_s: f64,
     /// Deceleration of the sensor [m/s²].
     pub(super) deceleration_m_per_s2: f64,
@@ -61,8 +62,10 @@ fn approach(
     let wanted = velocity.iter().map(|part| part * part).sum::<f64>().sqrt();
     let speed = smallest(nodes, limits, "linear_m_per_s").map_or(wanted, |most| wanted.min(most));
     let into = velocity[2].max(0.0) * speed / wanted;
+    // What answers a motion in another direction says nothing about this one: a place on the pad sticks before it slides.
+    let answers = |answer: &&Answer| (0..3).any(|i| velocity[i] != 0.0 && answer.row()[i] != 0.0);
     let latency = contacts.iter().flat_map(|contact| {
-        let own = contact.features.values().filter_map(Answer::lag_ms);
+        let own = contact.features.values().filter(answers).filter_map(Answer::lag_ms);
         own.chain([contact.latency_ms])
     });
     let reaction = 2.0 * nodes.period() + 1e-3 * latency.fold(0.0, f64::max);

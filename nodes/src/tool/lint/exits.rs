@@ -39,6 +39,11 @@ impl<'a> ModeLaw<'a> {
         self.all("done").next().is_none() && self.exits("go").all(Exit::is_lost)
     }
 
+    /// Returns whether the mode lasts at least some time [ms] while there is a contact, unless it fails.
+    pub(super) fn lasts_for(&self, ms: f64) -> bool {
+        self.conditions().all(|exit| exit.is_lost() || exit.waits() >= ms)
+    }
+
     /// Returns whether any exit waits for the value of a port.
     pub(super) fn watches(&self) -> bool {
         self.conditions().chain(self.fails()).any(|exit| exit.entry("when").is_some())

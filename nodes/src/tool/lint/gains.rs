@@ -96,7 +96,7 @@ fn unfiltered(mode: &ModeLaw<'_>, feature: &Feature) -> Option<Diagnostic> {
     // The difference of two samples has √2 times their noise.
     let factor = 2.0_f64.sqrt() * feature.kd / period;
     // A filter of less than a period smooths nothing, and a share below that of `kp` does no harm.
-    if feature.smoothing() >= period || factor <= feature.kp {
+    if feature.least_smoothing() >= period || factor <= feature.kp {
         return None;
     }
     mode.quantity(feature)?;

@@ -16,6 +16,8 @@ use crate::tool::control::law::{Feature, Guidance};
 const ALONG: f64 = 0.35;
 /// Largest part of an axis along z of the sensor with which it lies in the plane of the pad [1].
 const LYING: f64 = 0.5;
+/// Time in which the control of a position moves the sensor noticeably along a line [ms].
+const LONG_MS: f64 = 5000.0;
 
 pub(super) fn check(arm: &Arm<'_>) -> Diagnostics {
     arm.modes.iter().filter_map(|mode| along_line(arm, mode)).collect()
@@ -44,8 +46,8 @@ fn along_line(arm: &Arm<'_>, mode: &ModeLaw<'_>) -> Option<Diagnostic> {
     let why = match constants.next().map(|constant| &*constant.node).or_else(guide) {
         Some(follower) if stated.as_ref().is_none_or(Line::is_longer) => format!("the line that `{follower}` follows"),
         // Without a follower, the control of the position itself moves slowly along the line. This matters in a mode
-        // that only the end of the contact ends.
-        _ if !mode.lasts() => return None,
+        // that lasts.
+        _ if !mode.lasts_for(LONG_MS) => return None,
         _ => stated.filter(Line::is_longer)?.to_string(),
     };
     let message = format!(

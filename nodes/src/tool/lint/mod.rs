@@ -28,8 +28,9 @@
 //! | is a column used in no mode? | `unused_columns` |
 //! | does a gain do harm whatever is touched? | `gains` |
 //! | is a loop near instability over a contact? | `stability` |
+//! | may a change while the arm moves make one unstable? | `live` |
 //!
-//! `reach` asks `exit_bounds` and `deadbands`, and `gains` asks `deadbands`.
+//! `reach` asks `exit_bounds` and `deadbands`, `gains` asks `deadbands`, and `live` asks `stability`.
 
 mod approach;
 mod arm;
@@ -43,6 +44,7 @@ mod geometry;
 mod guides;
 mod idle_axes;
 mod lines;
+mod live;
 mod mode_law;
 mod opposed;
 mod presence;
@@ -64,7 +66,7 @@ use arm::{Arm, carried};
 use mode_law::ModeLaw;
 
 /// The checks of an arm, in the order of their warnings.
-const CHECKS: [fn(&Arm<'_>) -> Diagnostics; 10] = [
+const CHECKS: [fn(&Arm<'_>) -> Diagnostics; 11] = [
     contacts::misnamed,
     touches,
     reach::check,
@@ -75,6 +77,7 @@ const CHECKS: [fn(&Arm<'_>) -> Diagnostics; 10] = [
     columns,
     gains::check,
     stability::check,
+    live::check,
 ];
 
 /// Returns the warnings about the control law of a graph.

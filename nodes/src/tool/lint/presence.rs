@@ -11,7 +11,7 @@ use crate::tool::control::nodes::source;
 
 pub(super) fn check(arm: &Arm<'_>) -> Diagnostics {
     let mut found = Diagnostics::new();
-    found.extend(arm.outline.nodes.iter().filter_map(|node| rate(arm, node)));
+    found.extend(arm.outline.nodes.iter().filter_map(|node| without_cause(arm, node)));
     // A feature that another mode lets pass is meant for that mode.
     let passes = |wanted: &Feature| {
         let each = arm.modes.iter().flat_map(|mode| mode.moving().map(move |feature| (mode, feature)));
@@ -30,17 +30,25 @@ pub(super) fn check(arm: &Arm<'_>) -> Diagnostics {
     found
 }
 
-/// Returns the warning about a turning rate that something reads, where nothing says how the sensor moves along the line.
-fn rate(arm: &Arm<'_>, node: &OutlinedBlock) -> Option<Diagnostic> {
-    if node.kind.text != "curvature" || source(node, "twist").is_some() {
-        return None;
-    }
-    let port = format!("{}.rate", node.name);
+/// Returns the warning about an output that something reads, and that is never present: an input or a parameter of its
+/// node is missing.
+fn without_cause(arm: &Arm<'_>, node: &OutlinedBlock) -> Option<Diagnostic> {
+    let has = |param: &str| node.settings.iter().any(|setting| setting.path == param);
+    let (port, missing, help) = match &*node.kind.text {
+        "curvature" if source(node, "twist").is_none() => {
+            ("rate", "in.twist", "wire the twist that moves the sensor along the line to `in.twist`")
+        }
+        "contact_area" if !has("threshold") => {
+            ("interpolated", "threshold", "write the threshold of `binarize`, or its `release`, as `threshold`")
+        }
+        _ => return None,
+    };
+    let port = format!("{}.{port}", node.name);
     let reads = |reader: &&OutlinedBlock| reader.wires.iter().any(|wire| wire.source == port);
     let reader = arm.outline.nodes.iter().find(reads)?;
     let message =
-        format!("`{}` reads `{port}`, which is never present: `{}` has no `in.twist`", reader.name, node.name);
-    let help = format!("wire the twist that moves the sensor along the line to `in.twist` of `{}`", node.name);
+        format!("`{}` reads `{port}`, which is never present: `{}` has no `{missing}`", reader.name, node.name);
+    let help = format!("{help} of `{}`", node.name);
     Some(Diagnostic::new(Code::UnusedColumn, node.span.clone(), message).help(help))
 }
 

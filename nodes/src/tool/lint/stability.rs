@@ -18,7 +18,7 @@ use crate::tool::control::response::Loop;
 use crate::tool::control::shape::Shape;
 
 /// What a loop has to keep over each contact.
-const KEPT: Wanted = Wanted { peak: 1.8, gain_db: 8.0, phase_deg: 0.0 };
+pub(super) const KEPT: Wanted = Wanted { peak: 1.8, gain_db: 8.0, phase_deg: 0.0 };
 /// Margins that the rough sweep may show too large, and that still keep [`KEPT`].
 const AMPLE: Wanted = Wanted { peak: 1.4, gain_db: 12.0, phase_deg: 55.0 };
 /// Largest lag of the filters where the gain is 1, in a loop with less than [`GOOD_PHASE`] [deg]. An integrator leaves
@@ -101,7 +101,7 @@ fn is_largest(feature: &Feature, contacts: &[Contact]) -> bool {
 }
 
 /// Returns whether geometry or a contact of the bench says how a feature answers.
-fn is_known(mode: &ModeLaw<'_>, feature: &Feature, contacts: &[Contact]) -> bool {
+pub(super) fn is_known(mode: &ModeLaw<'_>, feature: &Feature, contacts: &[Contact]) -> bool {
     let is_stated = |quantity: &str| contacts.iter().any(|contact| contact.features.contains_key(quantity));
     mode.quantity(feature).is_some() || feature.quantity().is_some_and(is_stated)
 }
@@ -142,7 +142,7 @@ fn judge(mode: &ModeLaw<'_>, feature: &Feature, contacts: &[Contact]) -> Option<
 }
 
 /// Returns how a message names a contact.
-fn over(object: Option<&str>) -> String {
+pub(super) fn over(object: Option<&str>) -> String {
     object.map_or_else(|| "by geometry alone".into(), |object| format!("over `{object}`"))
 }
 
@@ -200,10 +200,24 @@ fn low_margin(
     let gains = gains.map(|(key, gain)| (key, down_to_two_digits(gain * factor)));
     let written = gains.iter().filter(|(_, gain)| *gain != 0.0);
     let text: Vec<String> = written.clone().map(|(key, gain)| format!("`{key} = {gain}`")).collect();
-    let help = format!("write {} or less in the gains of `{name}`", text.join(" and "));
+    let why = unmeasured(feature, contacts, low.object).unwrap_or_default();
+    let help = format!("write {} or less in the gains of `{name}`{why}", text.join(" and "));
     let places: Vec<_> = written.map(|(key, gain)| (mode.place_of_gain(feature, key), gain)).collect();
     places.into_iter().fold(diagnostic.help(help), |diagnostic, (place, gain)| {
         diagnostic.edit(Edit::Replace(place, format!("{gain:?}")))
+    })
+}
+
+/// Returns what to say of gains that are chosen by geometry, because the bench does not say how the object answers.
+fn unmeasured(feature: &Feature, contacts: &[Contact], object: Option<&str>) -> Option<String> {
+    let contact = contacts.iter().find(|contact| contact.name() == object)?;
+    let is_stated = contact.features.contains_key(feature.quantity()?);
+    (!is_stated).then(|| {
+        format!(
+            ". This leaves out the arm, which bears less: the bench does not say how `{}` answers, and `tactflow tune` \
+             measures it",
+            feature.name
+        )
     })
 }
 
