@@ -48,6 +48,23 @@ pub(super) fn good_behind_nodes() -> Vec<Variant> {
                 "set nodes.old.in.value=\"held.value\"",
             ],
         ),
+        // The newest sample passes without a contact only.
+        variant(
+            "hybrid",
+            &[
+                "gains.x = { kp = 2.0, kd = 0.1 }",
+                "set nodes.slow.type=\"low_pass\"",
+                "set nodes.slow.in.value=\"touch.x\"",
+                "set nodes.slow.time_constant_ms=20",
+                "set nodes.held.type=\"switch\"",
+                "set nodes.held.in.on=\"slow.value\"",
+                "set nodes.held.in.off=\"touch.x\"",
+                "set nodes.held.in.select=\"touch.present\"",
+                "set nodes.error.in.x=\"held.value\"",
+            ],
+        ),
+        // A wide range that stays stable.
+        variant("hybrid", &["set live.pid.gains.y.kp.max=8.0"]),
         // A slow side of a switch that only another mode uses.
         variant(
             "hybrid",

@@ -387,5 +387,13 @@ pub(super) fn at_second_sight() -> Vec<(&'static str, Variant)> {
         ),
         // What an operator may set while the arm moves.
         ("low-margin", variant("hybrid", &["set live.pid.gains.y.kp.max=20.0"])),
+        // Without a larger gain that keeps the margins.
+        (
+            "low-margin",
+            variant(
+                "hybrid",
+                &["gains.x = { kp = 3.3, ki = 0.0 }", "set live.pid.gains.x.ki={ min = 0.0, max = 500.0, rate = 1.0 }"],
+            ),
+        ),
     ]
 }

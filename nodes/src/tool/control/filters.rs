@@ -62,8 +62,13 @@ fn follow<'a>(nodes: &Nodes<'a>, port: &str, path: &mut Vec<&'a str>) -> Option<
     path.push(&node.name);
     let found = match node.kind.text.as_str() {
         "switch" => {
-            let sides: Vec<Way> = nodes.sides(node).filter_map(|side| follow(nodes, side, path)).collect();
-            slower(sides)
+            // The other side of a switch that a contact selects passes only without a contact.
+            let idle = source(node, "select").filter(|flag| nodes.is_open_in_contact(flag)).and(source(node, "off"));
+            let mut sides = Vec::new();
+            for side in nodes.sides(node) {
+                sides.extend(follow(nodes, side, path).map(|way| (way, Some(side) == idle)));
+            }
+            slower(&sides)
         }
         "gate" => source(node, "value").map_or_else(measured, |value| {
             let mut found = follow(nodes, value, path)?;
@@ -81,13 +86,17 @@ fn follow<'a>(nodes: &Nodes<'a>, port: &str, path: &mut Vec<&'a str>) -> Option<
     found
 }
 
-/// Returns the slower one of two sides, with the gates that stand on each side.
-fn slower(sides: Vec<Way>) -> Option<Way> {
-    let is_everywhere = |gate: &String| sides.iter().all(|side| side.gates.contains(gate));
-    let slowest = sides.iter().max_by(|one, other| one.delay().total_cmp(&other.delay()))?;
-    let least = sides.iter().map(Way::least_smoothing).fold(f64::INFINITY, f64::min);
+/// Returns the slower one of two sides, with the gates that stand on each side. The flag of a side says whether it passes
+/// only without a contact.
+fn slower(sides: &[(Way, bool)]) -> Option<Way> {
+    let is_everywhere = |gate: &String| sides.iter().all(|(side, _)| side.gates.contains(gate));
+    let (slowest, _) = sides.iter().max_by(|(one, _), (other, _)| one.delay().total_cmp(&other.delay()))?;
+    // Only what is the same measurement has its noise.
+    let noisy = sides.iter().filter(|(side, is_idle)| !is_idle && side.measured == slowest.measured);
+    let own = smoothing(&slowest.filters);
+    let least = noisy.map(|(side, _)| side.least_smoothing()).fold(own, f64::min);
     Some(Way {
-        spared_s: smoothing(&slowest.filters) - least,
+        spared_s: own - least,
         measured: slowest.measured.clone(),
         filters: slowest.filters.clone(),
         gates: slowest.gates.iter().filter(|gate| is_everywhere(gate)).cloned().collect(),

@@ -62,11 +62,13 @@ fn approach(
     let wanted = velocity.iter().map(|part| part * part).sum::<f64>().sqrt();
     let speed = smallest(nodes, limits, "linear_m_per_s").map_or(wanted, |most| wanted.min(most));
     let into = velocity[2].max(0.0) * speed / wanted;
-    // What answers a motion in another direction says nothing about this one: a place on the pad sticks before it slides.
+    // The response of what answers a motion in another direction says nothing about this one: a place on the pad sticks
+    // before it slides. Its latency counts where nothing answers in this direction.
     let answers = |answer: &&Answer| (0..3).any(|i| velocity[i] != 0.0 && answer.row()[i] != 0.0);
     let latency = contacts.iter().flat_map(|contact| {
-        let own = contact.features.values().filter(answers).filter_map(Answer::lag_ms);
-        own.chain([contact.latency_ms])
+        let own: Vec<f64> = contact.features.values().filter(answers).filter_map(Answer::lag_ms).collect();
+        let others = contact.features.values().filter_map(|answer| answer.latency_ms).filter(|_| own.is_empty());
+        own.iter().copied().chain(others).chain([contact.latency_ms]).collect::<Vec<_>>()
     });
     let reaction = 2.0 * nodes.period() + 1e-3 * latency.fold(0.0, f64::max);
     let stiffness = smallest(nodes, limits, "contact_n_per_m").filter(|_| into > 0.0);

@@ -96,19 +96,20 @@ fn unfiltered(mode: &ModeLaw<'_>, feature: &Feature) -> Option<Diagnostic> {
     // The difference of two samples has √2 times their noise.
     let factor = 2.0_f64.sqrt() * feature.kd / period;
     // A filter of less than a period smooths nothing, and a share below that of `kp` does no harm.
-    if feature.least_smoothing() >= period || factor <= feature.kp {
+    if feature.least_smoothing() >= period * (1.0 - 1e-9) || factor <= feature.kp {
         return None;
     }
     mode.quantity(feature)?;
     let name = &feature.name;
+    let is_switched = feature.smoothing() >= period;
+    let side = if is_switched { " on one side of a `switch`" } else { "" };
     let message = format!(
-        "`kd` of `{name}` differentiates a signal without a filter: the noise of a sample moves the sensor with a gain of \
+        "`kd` of `{name}` differentiates a signal without a filter{side}: the noise of a sample moves the sensor with a gain of \
          {factor:.1} 1/s"
     );
     let smooth = (5.0 * period * 1e3).max(20.0).ceil();
-    let help = format!(
-        "remove `kd`, or put a `low_pass` with `time_constant_ms = {smooth}` on the wire that measures `{name}`"
-    );
+    let place = if is_switched { "on this side" } else { &format!("on the wire that measures `{name}`") };
+    let help = format!("remove `kd`, or put a `low_pass` with `time_constant_ms = {smooth}` {place}");
     Some(Diagnostic::new(Code::UnfilteredDerivative, mode.place_of_gain(feature, "kd"), message).help(help))
 }
 

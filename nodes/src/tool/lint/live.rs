@@ -5,12 +5,15 @@ use tactflow_runtime::source::{Code, Diagnostic, Diagnostics, Edit};
 
 use super::arm::Arm;
 use super::mode_law::ModeLaw;
-use super::stability::{KEPT, is_known, over};
+use super::stability::{KEPT, is_known, over, unmeasured};
 use crate::tool::control::contacts::Contact;
 use crate::tool::control::digits::down_to_two_digits;
 use crate::tool::control::law::Feature;
 use crate::tool::control::margins::margins;
 use crate::tool::control::response::Loop;
+
+/// Number of gains that are tried, each 5 % smaller than the one before: down to a two hundredth of the largest.
+const TRIED: usize = 104;
 
 pub(super) fn check(arm: &Arm<'_>) -> Diagnostics {
     let loops = || arm.modes.iter().flat_map(|mode| mode.moving().map(move |feature| (mode, feature)));
@@ -66,8 +69,8 @@ impl<'a> Changed<'a> {
             return None;
         }
         let holds = |gain: &f64| contacts.iter().all(|one| is(&|around| KEPT.holds(&margins(around)), *gain, one));
-        let tried = std::iter::successors(Some(self.range.max), |gain| Some(gain * 0.95));
-        let best = tried.take_while(|gain| *gain > self.value).find(holds).unwrap_or(self.value);
+        let tried = std::iter::successors(Some(self.range.max), |gain| Some(gain * 0.95)).take(TRIED);
+        let best = tried.take_while(|gain| *gain > self.value).find(holds).map(down_to_two_digits);
         let (key, name, range) = (self.key, &self.feature.name, self.range);
         let message = format!(
             "`{}` may become {}, and the loop of `{name}` is then unstable {}",
@@ -75,12 +78,16 @@ impl<'a> Changed<'a> {
             range.max,
             over(shaken.name())
         );
-        let best = down_to_two_digits(best);
-        Some(
-            Diagnostic::new(Code::LowMargin, range.span.clone(), message)
-                .note(mode.place_of_gain(self.feature, key), format!("`{key}` is {} as written", self.value))
-                .help(format!("write `max = {best}` or less"))
-                .edit(Edit::Replace(range.span.clone(), format!("{best:?}"))),
-        )
+        let diagnostic = Diagnostic::new(Code::LowMargin, range.span.clone(), message)
+            .note(mode.place_of_gain(self.feature, key), format!("`{key}` is {} as written", self.value));
+        // A range that ends below the gain as written is a mistake.
+        Some(match best.filter(|best| *best > self.value) {
+            Some(best) => {
+                let why = unmeasured(self.feature, contacts, shaken.name()).unwrap_or_default();
+                let help = format!("write `max = {best}` or less{why}");
+                diagnostic.help(help).edit(Edit::Replace(range.span.clone(), format!("{best:?}")))
+            }
+            None => diagnostic.help("no larger gain keeps the margins: remove the line from `[live]`"),
+        })
     }
 }

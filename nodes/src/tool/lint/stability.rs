@@ -209,14 +209,13 @@ fn low_margin(
 }
 
 /// Returns what to say of gains that are chosen by geometry, because the bench does not say how the object answers.
-fn unmeasured(feature: &Feature, contacts: &[Contact], object: Option<&str>) -> Option<String> {
+pub(super) fn unmeasured(feature: &Feature, contacts: &[Contact], object: Option<&str>) -> Option<String> {
     let contact = contacts.iter().find(|contact| contact.name() == object)?;
-    let is_stated = contact.features.contains_key(feature.quantity()?);
-    (!is_stated).then(|| {
+    let quantity = feature.quantity()?;
+    contact.is_by_geometry(quantity).then(|| {
         format!(
-            ". This leaves out the arm, which bears less: the bench does not say how `{}` answers, and `tactflow tune` \
-             measures it",
-            feature.name
+            ". This leaves out the arm, which bears less: the bench does not say how `{quantity}` answers, and `tactflow \
+             tune` measures it"
         )
     })
 }

@@ -42,9 +42,9 @@ impl Use {
 
 /// Gives each misspelt definition the name that its references use, and reports it.
 ///
-/// `may_be` tests whether a definition, by its index, could be what a name refers to. If the references are in the file of
-/// the definitions (`is_own`), two references outweigh a definition, and the only unused definition is what the only
-/// unknown name refers to, even if they are not alike. Other files may share the definitions.
+/// `may_be` tests whether a definition, by its index, could be what a name refers to. With `is_own`, nothing else
+/// shares the definitions: two references outweigh a definition, and the only unused definition is what the only
+/// unknown name refers to, even if they are not alike.
 fn correct<'k>(
     code: Code,
     defined: impl IntoIterator<Item = &'k mut Key>,
