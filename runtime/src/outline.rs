@@ -45,7 +45,7 @@ pub struct Outline {
 /// A parameter that may change while the graph runs.
 #[derive(Debug, Clone)]
 pub struct OutlinedRange {
-    /// Its name: `node.param`.
+    /// Its full name: that of the node, and the path of the parameter in it, such as `pid.gains.x.kp`.
     pub name: String,
     /// Its largest value, in its unit.
     pub max: f64,

@@ -103,6 +103,7 @@ mod tests {
             ),
             ("N", to(1000.0), 15000.0, "`x` is 15000 N, but usual is at most 1000 N", "if 15000 is in mN, write `15`"),
             ("m", between, -800.0, "`x` is -800 m, but usual is -10 to 10 m", "if -800 is in mm, write `-0.8`"),
+            ("1", to(0.95), 1.0, "`x` is 1, but usual is at most 0.95", "write a number that is at most 0.95"),
             ("K", between, 11.0, "`x` is 11 K, but usual is -10 to 10 K", "write a number that is -10 to 10 K"),
         ];
         for (unit, range, number, message, help) in cases {

@@ -1,7 +1,7 @@
 //! Controllers as an integrator may write them.
 
 use super::columns::HALF_TURN;
-use super::variant::{Variant, cleared, compared, graph, search, variant};
+use super::variant::{Variant, cleared, compared, graph, search, variant, with_feature};
 
 /// The lines of all gains of a task, with each `kp` and `ki` times a factor.
 fn scaled(task: &'static str, factor: f64) -> Vec<String> {
@@ -63,8 +63,6 @@ pub(super) fn good_behind_nodes() -> Vec<Variant> {
                 "set nodes.error.in.x=\"held.value\"",
             ],
         ),
-        // A wide range that stays stable.
-        variant("hybrid", &["set live.pid.gains.y.kp.max=8.0"]),
         // A slow side of a switch that only another mode uses.
         variant(
             "hybrid",
@@ -156,6 +154,29 @@ pub(super) fn good() -> Vec<Variant> {
 /// Controllers that look like poor ones.
 pub(super) fn good_at_second_sight() -> Vec<Variant> {
     vec![
+        // The interpolated area has its threshold.
+        with_feature(
+            "hybrid",
+            "area",
+            "size.interpolated",
+            "[0, 0, 0.1, 0, 0, 0]",
+            &[
+                "set nodes.size.type=\"contact_area\"",
+                "set nodes.size.in.image=\"touch.repaired\"",
+                "set nodes.size.in.region=\"touch.region\"",
+                "set nodes.size.threshold=0.01",
+            ],
+        ),
+        // A line is held for a moment only.
+        with_feature(
+            "edge",
+            "y",
+            "touch.y",
+            "[0, -1, 0, 0, 0, 0]",
+            &["select = [0, 1, 1, 0, 0, 1]", "set modes.servo.done={ after_ms = 4000 }"],
+        ),
+        // A wide range that stays stable.
+        variant("hybrid", &["set live.pid.gains.y.kp.max=8.0"]),
         // A second projector that no mode changes.
         variant(
             "hybrid",

@@ -14,8 +14,8 @@ pub(super) struct Approach {
     pub(super) node: String,
     /// Speed of the sensor [m/s].
     pub(super) speed_m_per_s: f64,
-    /// Time until the arm follows a command: two periods, and the largest latency with which a contact answers a motion in this
-    /// direction [s].
+    /// Time until the arm follows a command: two periods, and the largest lag with which a contact answers a motion in
+    /// this direction [s].
     pub(super) reaction_s: f64,
     /// Deceleration of the sensor [m/s²].
     pub(super) deceleration_m_per_s2: f64,
@@ -50,6 +50,17 @@ pub(super) fn approaches(nodes: &Nodes<'_>, limits: &[Limiter], law: &Law, conta
     constants.chain(searches).filter(moves).filter_map(|found| approach(nodes, limits, contacts, found)).collect()
 }
 
+/// Returns by how much a contact answers a motion late at most [ms].
+///
+/// The response of what answers a motion in another direction says nothing about this one: a place on the pad sticks
+/// before it slides. Its latency counts where nothing answers in this direction.
+fn lag_ms(contact: &Contact, velocity: [f64; 3]) -> f64 {
+    let is_along = |answer: &&Answer| (0..3).any(|i| velocity[i] != 0.0 && answer.row()[i] != 0.0);
+    let along = contact.features.values().filter(is_along).filter_map(Answer::lag_ms).reduce(f64::max);
+    let latencies = || contact.features.values().filter_map(|answer| answer.latency_ms).reduce(f64::max);
+    along.or_else(latencies).unwrap_or_default().max(contact.latency_ms)
+}
+
 /// Returns the stopping distance and the impacts of one motion, or `None` if no limiter says how the sensor decelerates.
 fn approach(
     nodes: &Nodes<'_>,
@@ -62,14 +73,7 @@ fn approach(
     let wanted = velocity.iter().map(|part| part * part).sum::<f64>().sqrt();
     let speed = smallest(nodes, limits, "linear_m_per_s").map_or(wanted, |most| wanted.min(most));
     let into = velocity[2].max(0.0) * speed / wanted;
-    // The response of what answers a motion in another direction says nothing about this one: a place on the pad sticks
-    // before it slides. Its latency counts where nothing answers in this direction.
-    let answers = |answer: &&Answer| (0..3).any(|i| velocity[i] != 0.0 && answer.row()[i] != 0.0);
-    let latency = contacts.iter().flat_map(|contact| {
-        let own: Vec<f64> = contact.features.values().filter(answers).filter_map(Answer::lag_ms).collect();
-        let others = contact.features.values().filter_map(|answer| answer.latency_ms).filter(|_| own.is_empty());
-        own.iter().copied().chain(others).chain([contact.latency_ms]).collect::<Vec<_>>()
-    });
+    let latency = contacts.iter().map(|contact| lag_ms(contact, velocity));
     let reaction = 2.0 * nodes.period() + 1e-3 * latency.fold(0.0, f64::max);
     let stiffness = smallest(nodes, limits, "contact_n_per_m").filter(|_| into > 0.0);
     let impact = |contact: &Contact| {

@@ -1,5 +1,6 @@
 //! An arm and what moves it, with what its limits say about its features.
 
+use std::borrow::Cow;
 use std::collections::BTreeSet;
 use std::f64::consts::FRAC_PI_2;
 
@@ -64,6 +65,14 @@ impl<'a> Arm<'a> {
             _ => None,
         });
         objects.flatten().filter_map(Value::as_table)
+    }
+
+    /// Returns what the bench declares that the arm touches, or what geometry alone says.
+    pub(super) fn contacts_or_geometry(&self) -> Cow<'_, [Contact]> {
+        match self.contacts[..] {
+            [] => Cow::Owned(vec![Contact::by_geometry()]),
+            [..] => Cow::Borrowed(&self.contacts),
+        }
     }
 
     /// Returns whether a feature has a gain in any mode.

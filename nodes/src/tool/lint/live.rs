@@ -6,7 +6,6 @@ use tactflow_runtime::source::{Code, Diagnostic, Diagnostics, Edit};
 use super::arm::Arm;
 use super::mode_law::ModeLaw;
 use super::stability::{KEPT, is_known, over, unmeasured};
-use crate::tool::control::contacts::Contact;
 use crate::tool::control::digits::down_to_two_digits;
 use crate::tool::control::law::Feature;
 use crate::tool::control::margins::margins;
@@ -56,8 +55,7 @@ impl<'a> Changed<'a> {
     /// Returns the warning about a range that reaches up to a gain with which a loop is unstable. A loop that is unstable
     /// as written has its own.
     fn judge(&self, arm: &Arm<'_>, mode: &ModeLaw<'_>) -> Option<Diagnostic> {
-        let geometry = [Contact::by_geometry()];
-        let contacts = if arm.contacts.is_empty() { &geometry[..] } else { &arm.contacts[..] };
+        let contacts = &*arm.contacts_or_geometry();
         if !is_known(mode, self.feature, contacts) {
             return None;
         }

@@ -71,8 +71,7 @@ struct Found<'a> {
 
 pub(super) fn check(arm: &Arm<'_>) -> Diagnostics {
     let mut found = Diagnostics::new();
-    let geometry = [Contact::by_geometry()];
-    let contacts = if arm.contacts.is_empty() { &geometry[..] } else { &arm.contacts[..] };
+    let contacts = &*arm.contacts_or_geometry();
     // Most modes have the same loops.
     let mut seen = BTreeSet::new();
     for mode in &arm.modes {

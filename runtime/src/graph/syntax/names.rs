@@ -42,15 +42,15 @@ impl Use {
 
 /// Gives each misspelt definition the name that its references use, and reports it.
 ///
-/// `may_be` tests whether a definition, by its index, could be what a name refers to. With `is_own`, nothing else
-/// shares the definitions: two references outweigh a definition, and the only unused definition is what the only
-/// unknown name refers to, even if they are not alike.
+/// `may_be` tests whether a definition, by its index, could be what a name refers to. With `by_use`, the
+/// references decide: two of them outweigh a definition, and the only unused definition is what the only unknown name
+/// refers to, even if they are not alike.
 fn correct<'k>(
     code: Code,
     defined: impl IntoIterator<Item = &'k mut Key>,
     uses: &[Use],
     may_be: &dyn Fn(usize, &str) -> bool,
-    is_own: bool,
+    by_use: bool,
     sources: &SourceMap,
 ) -> Diagnostics {
     let mut defined: Vec<&mut Key> = defined.into_iter().collect();
@@ -71,11 +71,11 @@ fn correct<'k>(
         let is_nearest =
             count(wanted) > 1 || near == suggest_name(wanted, near.into_iter().chain(names.iter().map(String::as_str)));
         let close = candidates.iter().find(|i| near == Some(&names[**i])).filter(|_| is_nearest);
-        let is_only = is_own && (unknown.len(), candidates.len()) == (1, 1);
+        let is_only = by_use && (unknown.len(), candidates.len()) == (1, 1);
         let only = candidates.first().filter(|_| is_only && count(wanted) > 1);
         let Some(&i) = close.or(only) else { continue };
         let is_invalid = !is_name(&names[i]);
-        if is_invalid || (is_own && count(wanted) > 1) || sources.is_misspelt(&names[i], wanted) {
+        if is_invalid || (by_use && count(wanted) > 1) || sources.is_misspelt(&names[i], wanted) {
             let message = if is_invalid {
                 format!("`{}` is not a valid name", names[i])
             } else {
