@@ -90,14 +90,13 @@ impl Answer {
         self.latency_ms.into_iter().chain(late).reduce(f64::max).map(|lag| (10.0 * lag).round() / 10.0)
     }
 
-    /// Returns the first point of the response that is none, or that comes before a slower one.
+    /// Returns the wrong point of the response: the first one without which the others are right, or else the first that
+    /// is none or that comes before a slower one.
     fn bad_point(&self) -> Option<[f64; 3]> {
-        let mut last = 0.0;
-        self.response.iter().copied().find(|[hz, multiple, phase]| {
-            let is_good = *hz > last && *hz <= MAX_HZ && *multiple > 0.0 && multiple.is_finite() && phase.is_finite();
-            last = *hz;
-            !is_good
-        })
+        let points = &self.response;
+        let first = first_bad(points.iter())?;
+        let alone = (0..points.len()).find(|&i| first_bad(points[..i].iter().chain(&points[i + 1..])).is_none());
+        alone.map(|i| points[i]).or(Some(first))
     }
 
     fn check(&self, feature: &str) -> Result<(), String> {
@@ -120,6 +119,17 @@ impl Answer {
             _ => Ok(()),
         }
     }
+}
+
+/// Returns the first point of a response that is none, or that comes before a slower one.
+fn first_bad<'a>(mut points: impl Iterator<Item = &'a [f64; 3]>) -> Option<[f64; 3]> {
+    let mut last = 0.0;
+    let is_bad = |[hz, multiple, phase]: &&[f64; 3]| {
+        let is_good = *hz > last && *hz <= MAX_HZ && *multiple > 0.0 && multiple.is_finite() && phase.is_finite();
+        last = *hz;
+        !is_good
+    };
+    points.find(is_bad).copied()
 }
 
 impl Contact {

@@ -8,7 +8,7 @@ use tactflow_runtime::catalogue::Catalogue;
 use tactflow_runtime::graph::open_bench;
 use tactflow_runtime::signal::Joint;
 use tempfile::NamedTempFile;
-use toml_edit::{Array, DocumentMut, Item, Table, TableLike, Value};
+use toml_edit::{Array, ArrayOfTables, DocumentMut, Item, Table, TableLike, Value};
 
 /// The text of a bench, and what is to be changed in it.
 #[derive(Debug, Clone)]
@@ -79,6 +79,33 @@ impl BenchFile {
         Ok(())
     }
 
+    /// Sets a list of tables in a section: `[[facts.arm.contacts]]` for the key `contacts` of `["facts", "arm"]`. The
+    /// comments above the old tables stay.
+    ///
+    /// # Errors
+    /// If something on the way is no table.
+    pub(crate) fn set_tables(&mut self, section: &[&str], key: &str, mut tables: ArrayOfTables) -> Result<(), String> {
+        self.changes.push((String::new(), headed(section, key, tables.clone())));
+        let is_new = section.iter().try_fold(self.document.as_item(), |item, name| item.get(name)).is_none();
+        let table = self.table(section)?;
+        match table.get(key) {
+            Some(Item::ArrayOfTables(old)) => tables.iter_mut().zip(old.iter()).for_each(|(new, old)| keep(new, old)),
+            Some(_) => {
+                let above = table.key(key).and_then(|key| key.leaf_decor().prefix()).cloned();
+                tables.iter_mut().take(1).for_each(|new| new.decor_mut().set_prefix(above.clone().unwrap_or_default()));
+            }
+            None => {}
+        }
+        table.remove(key);
+        table.insert(key, Item::ArrayOfTables(tables));
+        let root = self.document.as_item_mut();
+        let made = section.iter().try_fold(root, |item, name| item.get_mut(name)).filter(|_| is_new);
+        if let Some(Item::Table(made)) = made {
+            made.set_implicit(true);
+        }
+        Ok(())
+    }
+
     /// Returns a section, which is made if it is absent.
     fn table(&mut self, section: &[&str]) -> Result<&mut dyn TableLike, String> {
         let fail = format!("`{}` of `{}` is not a table that can be changed", section.join("."), self.path.display());
@@ -106,8 +133,9 @@ impl BenchFile {
         let mut section = "";
         for (name, line) in &self.changes {
             if section != name {
-                lines.push(format!("[{name}]"));
                 section = name;
+                // A list of tables has the name of its section in its own headers.
+                lines.extend(Some(format!("[{name}]")).filter(|_| !name.is_empty()));
             }
             lines.push(line.clone());
         }
@@ -210,6 +238,31 @@ fn push(list: &mut Array, mut value: Value) {
     list.push_formatted(value);
 }
 
+/// Returns a list of tables as it stands in a file, without the section around it.
+pub(crate) fn headed(section: &[&str], key: &str, tables: ArrayOfTables) -> String {
+    let inner = (key, Item::ArrayOfTables(tables));
+    let outer = section.iter().rev().fold(inner, |(key, item), name| {
+        let mut table = Table::new();
+        table.set_implicit(true);
+        table.insert(key, item);
+        (name, Item::Table(table))
+    });
+    let mut text = DocumentMut::new();
+    text.insert(outer.0, outer.1);
+    text.to_string().trim().to_owned()
+}
+
+/// Gives a table, and those in it, the comments and the place of old ones.
+fn keep(new: &mut Table, old: &Table) {
+    *new.decor_mut() = old.decor().clone();
+    new.set_position(old.position());
+    for (key, item) in new.iter_mut() {
+        if let (Item::Table(new), Some(Item::Table(old))) = (item, old.get(&key)) {
+            keep(new, old);
+        }
+    }
+}
+
 /// Returns a list of numbers, each rounded to a number of decimals.
 pub(crate) fn numbers(list: &[f64], decimals: i32) -> Array {
     let scale = 10.0_f64.powi(decimals);
@@ -306,6 +359,39 @@ linear_m_per_s = 0.05
             bench.extend(&["limits"], "keep_out", rows).expect("a list");
             assert_eq!(bench.changes(), format!("[limits]\nkeep_out = {after}"));
             assert_eq!(bench.text(), format!("[limits]\nkeep_out = {after} # mine\n"));
+            fs::remove_file(path).expect("it is there");
+        }
+    }
+
+    #[test]
+    fn a_list_of_tables_takes_the_place_of_the_old_one() {
+        let contact = |object: &str, vz: f64| {
+            let (mut table, mut pressure) = (Table::new(), Table::new());
+            pressure.insert("vz", vz.into());
+            table.insert("object", object.into());
+            table.insert("pressure", Item::Table(pressure));
+            table
+        };
+        let cases = [
+            ("", "\n[[facts.arm.contacts]]\nobject = \"pen\"\n\n[facts.arm.contacts.pressure]\nvz = 7.0\n"),
+            (
+                "\n[facts.arm]\nend = 1\n\n# Old.\ncontacts = [{ object = \"pen\" }]\n\n[limits]\n",
+                "\n[facts.arm]\nend = 1\n\n# Old.\n[[facts.arm.contacts]]\nobject = \"pen\"\n\n\
+                 [facts.arm.contacts.pressure]\nvz = 7.0\n\n[limits]\n",
+            ),
+            (
+                "\n# Mine.\n[[facts.arm.contacts]]\nobject = \"box\"\n\n# Soft.\n[facts.arm.contacts.pressure]\nvz = 1.0\n\n[limits]\n",
+                "\n# Mine.\n[[facts.arm.contacts]]\nobject = \"pen\"\n\n# Soft.\n[facts.arm.contacts.pressure]\nvz = 7.0\n\n[limits]\n",
+            ),
+        ];
+        for (before, after) in cases {
+            let path = file("tables");
+            fs::write(&path, format!("[bind]\narm = \"arm\"\n{before}")).expect("a file");
+            let mut bench = BenchFile::read(&path).expect("it is TOML");
+            let tables = ArrayOfTables::from_iter([contact("pen", 7.0)]);
+            bench.set_tables(&["facts", "arm"], "contacts", tables).expect("a table");
+            assert_eq!(bench.text(), format!("[bind]\narm = \"arm\"\n{after}"));
+            assert!(bench.changes().starts_with("[[facts.arm.contacts]]\nobject"), "{}", bench.changes());
             fs::remove_file(path).expect("it is there");
         }
     }

@@ -20,7 +20,7 @@ use tactflow_runtime::signal::Signal;
 use tactflow_runtime::source::quoted;
 
 pub(super) use arm::{GuidedArm, StillPosture, chain};
-pub(super) use bench_file::{BenchFile, joint_numbers, numbers};
+pub(super) use bench_file::{BenchFile, headed, joint_numbers, numbers};
 
 /// Longest time between two looks at the devices, which wake the thread when they sample.
 const LOOK: Duration = Duration::from_millis(1);

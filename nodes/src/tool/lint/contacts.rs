@@ -50,16 +50,73 @@ pub(super) fn misnamed(arm: &Arm<'_>) -> Diagnostics {
     found.collect()
 }
 
-/// Returns the place of the mistake: the key that is not known, or the contact that cannot be read.
+/// Returns the place of the mistake: the key that is not known, or the smallest value without which the contacts can be
+/// read, or else the first contact that cannot be read by itself.
 fn place(name: &str, arm: &str, value: &Value, why: &str) -> Range<usize> {
-    let Item::Array(entries) = &value.item else { return value.span.clone() };
-    let is_wrong = |entry: &&Value| {
-        let alone = toml::Value::try_from(*entry).map(|entry| toml::Value::Array(vec![entry]));
-        alone.is_ok_and(|alone| contacts(&[(name.to_owned(), alone)], arm).is_err())
+    let is_wrong = |value: &Value| {
+        let fact = toml::Value::try_from(value).map(|value| [(name.to_owned(), value)]);
+        fact.is_ok_and(|fact| contacts(&fact, arm).is_err())
     };
-    let Some(entry) = entries.iter().find(is_wrong) else { return value.span.clone() };
+    let alone = |entry: &&Value| is_wrong(&Value { item: Item::Array(vec![(*entry).clone()]), ..value.clone() });
+    let entry = children(value).into_iter().find(alone).unwrap_or(value);
     let unknown = why.split_once("unknown field `").and_then(|(_, rest)| rest.split_once('`'));
-    unknown.and_then(|(key, _)| key_in(entry, key)).unwrap_or_else(|| entry.span.clone())
+    let key = unknown.and_then(|(key, _)| key_in(entry, key));
+    key.unwrap_or_else(|| culprit(value, &is_wrong).unwrap_or(entry).span.clone())
+}
+
+/// Returns the innermost value without which the whole is right. In a list with several mistakes that is the first one:
+/// what follows it is left out. `None` if there is no such value.
+fn culprit<'a>(whole: &'a Value, is_wrong: &impl Fn(&Value) -> bool) -> Option<&'a Value> {
+    let (mut at, mut path) = (None, Vec::new());
+    loop {
+        let inner = children(at.unwrap_or(whole));
+        let mends = |i: &usize| !is_wrong(&edited(whole, &path, |item| remove(item, *i)));
+        let Some(i) = (0..inner.len()).find(mends) else {
+            let ends_well = |count: usize| !is_wrong(&edited(whole, &path, |item| truncate(item, count)));
+            let first = (0..inner.len()).find(|i| ends_well(*i) && !ends_well(i + 1));
+            return first.map(|i| inner[i]).or(at);
+        };
+        at = Some(inner[i]);
+        path.push(i);
+    }
+}
+
+/// Returns the values in a list or a table, in their order.
+fn children(value: &Value) -> Vec<&Value> {
+    match &value.item {
+        Item::Array(items) => items.iter().collect(),
+        Item::Table(table) => table.entries.iter().map(|(_, value)| value).collect(),
+        _ => Vec::new(),
+    }
+}
+
+/// Returns a value in which the item at a path of positions is changed.
+fn edited(whole: &Value, path: &[usize], change: impl FnOnce(&mut Item)) -> Value {
+    let mut rest = whole.clone();
+    let mut at = &mut rest;
+    for &i in path {
+        at = match &mut at.item {
+            Item::Array(items) => &mut items[i],
+            Item::Table(table) => &mut table.entries[i].1,
+            _ => return rest,
+        };
+    }
+    change(&mut at.item);
+    rest
+}
+
+fn remove(item: &mut Item, i: usize) {
+    match item {
+        Item::Array(items) => drop(items.remove(i)),
+        Item::Table(table) => drop(table.entries.remove(i)),
+        _ => {}
+    }
+}
+
+fn truncate(item: &mut Item, count: usize) {
+    if let Item::Array(items) = item {
+        items.truncate(count);
+    }
 }
 
 /// Returns the place of a key in a value.

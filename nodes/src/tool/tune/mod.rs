@@ -4,6 +4,7 @@ mod amplitudes;
 mod bode;
 mod cases;
 mod climb;
+mod contact_tables;
 mod course;
 mod experiment;
 mod fit;

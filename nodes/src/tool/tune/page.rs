@@ -8,10 +8,10 @@ use tactflow_runtime::cli::table;
 use super::amplitudes::Unknown;
 use super::cases::Stated;
 use super::climb;
+use super::contact_tables;
 use super::identify::Identified;
 use super::limited::Limited;
 use super::propose::{Bound, TunedFeature};
-use super::save;
 use super::settled::Held;
 use super::step::{self, Step};
 use super::tuned::Tuned;
@@ -248,11 +248,7 @@ fn lines(tuned: &Tuned) -> String {
     for Stated { file, contacts } in tuned.stated() {
         let file = file.as_deref().and_then(Path::file_name).map(|name| name.to_string_lossy().into_owned());
         let file = file.unwrap_or_else(|| "the bench".into());
-        let _ = writeln!(text, "\n[facts.{}]                         # in {file}\ncontacts = [", tuned.arm);
-        for contact in &contacts {
-            let _ = writeln!(text, "    {},", save::value(contact));
-        }
-        text += "]\n";
+        let _ = write!(text, "\n# in {file}\n{}", contact_tables::lines(&tuned.arm, &contacts));
     }
     text
 }
