@@ -385,6 +385,19 @@ pub(super) fn at_second_sight() -> Vec<(&'static str, Variant)> {
                 ],
             ),
         ),
+        // Nor where a mode waits for it.
+        (
+            "unused-column",
+            variant(
+                "hybrid",
+                &[
+                    "set nodes.size.type=\"contact_area\"",
+                    "set nodes.size.in.image=\"touch.repaired\"",
+                    "set nodes.size.in.region=\"touch.region\"",
+                    "set modes.servo.done={ when = \"size.interpolated\", above = 0.001 }",
+                ],
+            ),
+        ),
         // What an operator may set while the arm moves.
         ("low-margin", variant("hybrid", &["set live.pid.gains.y.kp.max=20.0"])),
         // Without a larger gain that keeps the margins.

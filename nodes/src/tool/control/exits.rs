@@ -3,6 +3,9 @@
 use tactflow_runtime::graph::OutlinedMode;
 use tactflow_runtime::source::{Item, Value};
 
+/// The keys of the exits of a mode.
+pub(crate) const EXITS: [&str; 4] = ["go", "on_lost", "done", "fail"];
+
 /// An exit of a mode.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Exit<'a> {
@@ -29,6 +32,11 @@ impl<'a> Exit<'a> {
     /// Returns the port for whose value it waits.
     pub(crate) fn when(self) -> Option<&'a str> {
         self.word("when")
+    }
+
+    /// Returns the port whose presence it watches.
+    pub(crate) fn of(self) -> Option<&'a str> {
+        self.word("of")
     }
 
     /// Returns one of its entries.

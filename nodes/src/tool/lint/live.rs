@@ -16,8 +16,9 @@ const TRIED: usize = 104;
 
 pub(super) fn check(arm: &Arm<'_>) -> Diagnostics {
     let loops = || arm.modes.iter().flat_map(|mode| mode.moving().map(move |feature| (mode, feature)));
-    let found = |range| loops().find_map(|(mode, feature)| Changed::of(feature, range)?.judge(arm, mode));
-    arm.outline.live.iter().filter_map(found).collect()
+    let of_range = |range| loops().filter_map(move |(mode, feature)| Changed::of(feature, range)?.judge(arm, mode));
+    let tightest = |range| of_range(range).min_by(|(one, _), (other, _)| one.total_cmp(other));
+    arm.outline.live.iter().filter_map(tightest).map(|(_, found)| found).collect()
 }
 
 /// A feature with a gain that may change.
@@ -52,9 +53,9 @@ impl<'a> Changed<'a> {
         feature
     }
 
-    /// Returns the warning about a range that reaches up to a gain with which a loop is unstable. A loop that is unstable
-    /// as written has its own.
-    fn judge(&self, arm: &Arm<'_>, mode: &ModeLaw<'_>) -> Option<Diagnostic> {
+    /// Returns the warning about a range that reaches up to a gain with which a loop is unstable, and the largest gain
+    /// that keeps the margins. A loop that is unstable as written has its own warning.
+    fn judge(&self, arm: &Arm<'_>, mode: &ModeLaw<'_>) -> Option<(f64, Diagnostic)> {
         let contacts = &*arm.contacts_or_geometry();
         if !is_known(mode, self.feature, contacts) {
             return None;
@@ -79,13 +80,15 @@ impl<'a> Changed<'a> {
         let diagnostic = Diagnostic::new(Code::LowMargin, range.span.clone(), message)
             .note(mode.place_of_gain(self.feature, key), format!("`{key}` is {} as written", self.value));
         // A range that ends below the gain as written is a mistake.
-        Some(match best.filter(|best| *best > self.value) {
+        let best = best.filter(|best| *best > self.value);
+        let found = match best {
             Some(best) => {
                 let why = unmeasured(self.feature, contacts, shaken.name()).unwrap_or_default();
                 let help = format!("write `max = {best}` or less{why}");
                 diagnostic.help(help).edit(Edit::Replace(range.span.clone(), format!("{best:?}")))
             }
             None => diagnostic.help("no larger gain keeps the margins: remove the line from `[live]`"),
-        })
+        };
+        Some((best.unwrap_or(self.value), found))
     }
 }

@@ -1,10 +1,11 @@
 //! Features that are never present where they are controlled: a gate keeps them away, or a wire is missing.
 
-use tactflow_runtime::graph::OutlinedBlock;
+use tactflow_runtime::graph::{OutlinedBlock, OutlinedMode};
 use tactflow_runtime::source::{Code, Diagnostic, Diagnostics};
 
 use super::arm::Arm;
 use super::mode_law::ModeLaw;
+use crate::tool::control::exits::{EXITS, exits};
 use crate::tool::control::filters::way;
 use crate::tool::control::law::Feature;
 use crate::tool::control::nodes::source;
@@ -44,12 +45,22 @@ fn without_cause(arm: &Arm<'_>, node: &OutlinedBlock) -> Option<Diagnostic> {
         _ => return None,
     };
     let port = format!("{}.{port}", node.name);
-    let reads = |reader: &&OutlinedBlock| reader.wires.iter().any(|wire| wire.source == port);
-    let reader = arm.outline.nodes.iter().find(reads)?;
-    let message =
-        format!("`{}` reads `{port}`, which is never present: `{}` has no `{missing}`", reader.name, node.name);
+    let reader = reader(arm, &port)?;
+    let message = format!("{reader} reads `{port}`, which is never present: `{}` has no `{missing}`", node.name);
     let help = format!("{help} of `{}`", node.name);
     Some(Diagnostic::new(Code::UnusedColumn, node.span.clone(), message).help(help))
+}
+
+/// Returns a node or a mode that reads a port, for messages.
+fn reader(arm: &Arm<'_>, port: &str) -> Option<String> {
+    let reads = |reader: &&OutlinedBlock| reader.wires.iter().any(|wire| wire.source == port);
+    let node = arm.outline.nodes.iter().find(reads).map(|node| format!("`{}`", node.name));
+    let waits = |mode: &&OutlinedMode| {
+        let mut all = EXITS.iter().flat_map(|key| exits(mode, key));
+        all.any(|exit| [exit.when(), exit.of()].contains(&Some(port)))
+    };
+    let mode = || arm.outline.modes.iter().find(waits).map(|mode| format!("the mode `{}`", mode.name));
+    node.or_else(mode)
 }
 
 /// Returns the flag that keeps a feature from moving the sensor in a mode, and why.
