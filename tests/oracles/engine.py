@@ -424,12 +424,20 @@ def main():
     parser.add_argument("--stiffness", type=float, default=1e6, help="of the object behind a tactel [N/m]")
     parser.add_argument("--seconds", type=float, default=10.0)
     parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--again", action="store_true", help="start again after each run, until it is stopped")
     args = parser.parse_args()
-    world = World(args)
     with socket.create_server(("127.0.0.1", args.port)) as server:
         server.settimeout(60.0)
         print(server.getsockname()[1], flush=True)
-        connection, _ = server.accept()
+        run(server, args)
+        while args.again:
+            run(server, args)
+
+
+def run(server, args):
+    """One run, with a world of its own."""
+    world = World(args)
+    connection, _ = server.accept()
     connection.settimeout(60.0)
     connection.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
     with connection, connection.makefile("rwb") as lines:

@@ -6,8 +6,9 @@ use std::io::Write as _;
 
 use serde_json::Value;
 
+use crate::explained_motion::swing;
 use crate::lockstep::{Peer, command};
-use crate::tool::said;
+use crate::tool::{said, say};
 
 /// Objects: a soft ball, a rigid pen and a stiff box.
 const OBJECTS: [(&str, &str); 3] = [
@@ -253,4 +254,28 @@ fn the_tasks_bear_what_happens_to_objects_and_pad_on_a_physics_engine() {
         }
     }
     assert!(wrong.is_empty(), "{wrong}");
+}
+
+#[test]
+#[ignore = "it needs MuJoCo: `.ci/edge` installs it"]
+fn tune_tells_the_gain_at_which_a_loop_oscillates_on_a_physics_engine() {
+    for (object, scene) in &OBJECTS[..2] {
+        let peer = Peer::of("../oracles/engine.py", &format!("{scene} --again --seconds 100"));
+        let address = format!("devices.bench.address=127.0.0.1:{}", peer.port);
+        let alone = ["--set", "nodes.schedule.min=1.0", "--set", "nodes.schedule.max=1.0"];
+        let bench = ["graphs/force.toml", "--bench", "graphs/benches/lockstep.toml", "--set", &address];
+        let args = [&bench[..], &alone].concat();
+        let low = ["--set", "nodes.pid.gains.pressure.kp=0.25", "--set", "nodes.pid.gains.pressure.ki=0.04"];
+        let said = say(&[&["tune", "--format", "json"], &args[..], &low].concat());
+        assert_eq!(said.code, 0, "{object}: {}{}", said.out, said.err);
+        let found: Value = serde_json::from_str(&said.out).unwrap();
+        let of_feature = |path: &str| found["features"][0].pointer(path).and_then(Value::as_f64).unwrap();
+        let [kp, ki, margin] = ["/new/0", "/new/1", "/margins/0/gain_db"].map(of_feature);
+        let with = |db: f64| swing(&args, [kp, ki].map(|gain| gain * 10_f64.powf(db / 20.0)));
+        let (still, below, beyond) = (with(0.0), with(margin - 2.5), with(margin + 2.5));
+        assert!(
+            below < 4.0 * still && beyond > 10.0 * still,
+            "{object}: kp {kp}, {margin} dB: {still}, {below}, {beyond}"
+        );
+    }
 }

@@ -81,7 +81,7 @@ fn a_filter_does_not_change_the_lag_behind_an_edge_that_turns_and_an_integral_ta
 }
 
 /// The error of the pressure in a run, from 10 s on, without its mean (rms).
-fn swing(args: &[&str], [kp, ki]: [f64; 2]) -> f64 {
+pub(crate) fn swing(args: &[&str], [kp, ki]: [f64; 2]) -> f64 {
     let gains = [format!("kp={kp:?}"), format!("ki={ki:?}")].map(|gain| format!("nodes.pid.gains.pressure.{gain}"));
     let rows = recorded(&[args, &["--set", &gains[0], "--set", &gains[1]]].concat(), "16s");
     let late = rows.iter().filter(|row| row["time"] > 10.0);

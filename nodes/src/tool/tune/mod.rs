@@ -143,12 +143,14 @@ pub(super) fn run(args: TuneArgs, shell: &Shell) -> Result<u8, u8> {
     };
     let ranges = ranges.iter().filter_map(|range| range.beyond(&tuned.features)).collect();
     let tuned = Tuned { ranges, ..tuned };
-    match args.format {
-        Format::Json => shell.say_json(&tuned),
-        Format::Text => shell.say(page::text(&tuned).trim_end()),
-    }
     let is_whole =
         tuned.features.iter().all(|feature| feature.new.is_some()) && tuned.settled.iter().all(Settled::is_good);
+    match args.format {
+        Format::Json => shell.say_json(&tuned),
+        // What is saved is shown when it is written.
+        Format::Text if args.save && is_whole => shell.say(page::text(&tuned).trim_end()),
+        Format::Text => shell.say((page::text(&tuned) + &page::lines(&tuned)).trim_end()),
+    }
     if args.save && is_whole {
         let written = save::save(&args, &outline, &tuned, shell).map_err(|message| shell.refuse(message))?;
         shell.say(&written);

@@ -39,7 +39,6 @@ pub(super) fn text(tuned: &Tuned) -> String {
         text.push('\n');
     }
     text += &settled(tuned);
-    text += &lines(tuned);
     text
 }
 
@@ -229,7 +228,7 @@ fn followed(step: &Step) -> String {
 }
 
 /// The lines for the files.
-fn lines(tuned: &Tuned) -> String {
+pub(super) fn lines(tuned: &Tuned) -> String {
     let mut text = String::new();
     for feature in &tuned.features {
         let (Some([kp, ki, kd]), Some(pid)) = (feature.new, &feature.feature.pid) else { continue };
