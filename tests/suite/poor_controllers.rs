@@ -154,8 +154,10 @@ fn the_numbers_of_a_warning_are_those_of_explain() {
     let explained: serde_json::Value = serde_json::from_str(&said.out).unwrap();
     let loops = explained["motions"][0]["modes"][1]["loops"].as_array().unwrap();
     let margins = &loops.iter().find(|one| one["feature"] == "pressure").unwrap()["margins"];
-    let [peak, gain] = ["peak_sensitivity", "gain_db"].map(|key| margins[key].as_f64().unwrap());
-    let expected = format!("the peak of its sensitivity is {peak:.1}, and its gain margin {gain:.1} dB");
+    let [peak, gain, phase] = ["peak_sensitivity", "gain_db", "phase_deg"].map(|key| margins[key].as_f64().unwrap());
+    let phase = phase.floor();
+    let expected =
+        format!("the peak of its sensitivity is {peak:.2}, its gain margin {gain:.1} dB and its phase margin {phase}°");
     let checked = crate::tool::say(&[&["check"], &args[..]].concat());
     assert!(checked.err.contains(&expected), "{expected}\n{}", checked.err);
     let run = crate::tool::say(&[&["run"], &args[..], &["--for", "10ms", "--quiet"]].concat());

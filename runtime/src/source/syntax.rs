@@ -45,6 +45,11 @@ pub fn parse_table(file: &SourceFile) -> Result<Value, Box<Diagnostic>> {
                 // A word without any quote may stand for a number.
                 if file.text[value.clone()].contains('"') {
                     diagnostic.help(did_you_mean(&quoted)).edit(Edit::Replace(at(value), quoted))
+                } else if text.starts_with('.') && text.parse::<f64>().is_ok() {
+                    let number = format!("0{text}");
+                    let message = "a number needs a digit in front of its point";
+                    let diagnostic = Diagnostic { message: message.to_owned(), ..diagnostic };
+                    diagnostic.help(did_you_mean(&number)).edit(Edit::Replace(at(value), number))
                 } else {
                     diagnostic.help(format!("write `{quoted}` if a string is meant"))
                 }
@@ -206,6 +211,17 @@ mod tests {
 
     use super::*;
     use crate::source::SourceMap;
+
+    #[test]
+    fn a_number_that_begins_with_its_point_gets_a_digit() {
+        for (text, number) in [("x = .13\n", "0.13"), ("x = [1.0, .5]\n", "0.5")] {
+            let mut sources = SourceMap::default();
+            let file = sources.add_file(Path::new("x.toml"), text).clone();
+            let mistake = parse_table(&file).unwrap_err();
+            let Some(Edit::Replace(place, written)) = mistake.fix.first() else { panic!("{mistake:?}") };
+            assert_eq!((text[file.local(place)].to_owned(), &**written), (number[1..].to_owned(), number));
+        }
+    }
 
     #[test]
     fn only_the_first_mistake_is_reported_at_the_line_that_causes_it() {

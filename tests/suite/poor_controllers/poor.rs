@@ -398,6 +398,55 @@ pub(super) fn at_second_sight() -> Vec<(&'static str, Variant)> {
                 ],
             ),
         ),
+        // The median of three samples lets as much noise pass as the mean of two.
+        (
+            "unfiltered-derivative",
+            variant(
+                "hybrid",
+                &[
+                    "set nodes.few.type=\"median\"",
+                    "set nodes.few.in.value=\"touch.x\"",
+                    "set nodes.few.window=3",
+                    "set nodes.error.in.x=\"few.value\"",
+                    "gains.x = { kp = 2.0, kd = 0.2 }",
+                ],
+            ),
+        ),
+        // Two filters are slow, and one alone could not be fast enough.
+        (
+            "slow-filter",
+            variant(
+                "edge",
+                &[
+                    "set nodes.few.type=\"median\"",
+                    "set nodes.few.in.value=\"line.orientation\"",
+                    "set nodes.few.window=101",
+                    "set nodes.direction.in.value=\"few.value\"",
+                    "set nodes.direction.window=101",
+                    "gains.orientation = { kp = 5.0 }",
+                ],
+            ),
+        ),
+        // A force that rests a fifth above its setpoint.
+        (
+            "opposed-motion",
+            variant(
+                "edge",
+                &["gains.pressure = { kp = 0.4 }", "set modes.servo.set.reach.twist=[0, 0, 0.008, 0, 0, 0]"],
+            ),
+        ),
+        // Four seconds are enough for the contact to rest beside its setpoint.
+        (
+            "opposed-motion",
+            variant(
+                "hybrid",
+                &[
+                    "set modes.servo.set.reach.twist=[0.01, 0, 0, 0, 0, 0]",
+                    "set modes.servo.go={ to = \"rest\", after_ms = 4000 }",
+                    "set modes.rest.on_lost={ of = \"touch.present\", after_ms = 100, to = \"approach\" }",
+                ],
+            ),
+        ),
         // What an operator may set while the arm moves.
         ("low-margin", variant("hybrid", &["set live.pid.gains.y.kp.max=20.0"])),
         // Without a larger gain that keeps the margins.

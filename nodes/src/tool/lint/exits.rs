@@ -34,11 +34,6 @@ impl<'a> ModeLaw<'a> {
         self.exits("go").filter(|exit| exit.is_lost())
     }
 
-    /// Returns whether only the end of the contact, or a failure, ends the mode.
-    pub(super) fn lasts(&self) -> bool {
-        self.all("done").next().is_none() && self.exits("go").all(Exit::is_lost)
-    }
-
     /// Returns whether the mode lasts at least some time [ms] while there is a contact, unless it fails.
     pub(super) fn lasts_for(&self, ms: f64) -> bool {
         self.conditions().all(|exit| exit.is_lost() || exit.waits() >= ms)

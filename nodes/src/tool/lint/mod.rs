@@ -39,6 +39,7 @@ mod contacts;
 mod deadbands;
 mod exit_bounds;
 mod exits;
+mod faster_filters;
 mod gains;
 mod geometry;
 mod guides;

@@ -98,7 +98,7 @@ fn push(arm: &Arm<'_>, mode: &ModeLaw<'_>) -> Option<Diagnostic> {
 }
 
 /// Share of its setpoint by which a constant motion may shift a force [1].
-const SHIFTED: f64 = 0.2;
+const SHIFTED: f64 = 0.15;
 
 /// Returns the warning about a constant motion into the object beside the control of a force: without an integral, the
 /// force rests above its setpoint, where the controller moves back as fast.
@@ -148,6 +148,9 @@ fn waits_for_force(arm: &Arm<'_>, mode: &ModeLaw<'_>) -> bool {
 /// Distance from its setpoint at which a constant motion may hold a contact [m].
 const MAX_SHIFT_M: f64 = 0.001;
 
+/// Time after which a contact is at rest, as a multiple of the time constant of its loop [1].
+const SETTLED: f64 = 5.0;
+
 /// Returns the warning about a constant motion along a component in which a feature holds the place of an object that does
 /// not move: the contact rests beside the setpoint, where the controller moves back as fast.
 fn dragged(arm: &Arm<'_>, mode: &ModeLaw<'_>) -> Option<Diagnostic> {
@@ -155,7 +158,7 @@ fn dragged(arm: &Arm<'_>, mode: &ModeLaw<'_>) -> Option<Diagnostic> {
         object.get("motion").is_none_or(|motion| matches!(&motion.item, Item::Array(steps) if steps.is_empty()))
     };
     // A motion beside the control follows an object that moves, and a short one comes to no rest.
-    if arm.objects().next().is_none() || !arm.objects().all(is_still) || !mode.lasts() {
+    if arm.objects().next().is_none() || !arm.objects().all(is_still) {
         return None;
     }
     let constants = mode.law.constants.iter().filter(|constant| constant.is_open_in_contact);
@@ -167,6 +170,7 @@ fn dragged(arm: &Arm<'_>, mode: &ModeLaw<'_>) -> Option<Diagnostic> {
                     && feature.kp > 0.0
                     && feature.schedules.is_empty()
                     && feature.column[i] != 0.0
+                    && mode.lasts_for(SETTLED * 1e3 / (feature.kp * feature.column[i]).abs())
                     && feature.is_open_in_contact(&mode.nodes)
                     && mode.quantity(feature) == Some(["x", "y"][i])
                     && shift(feature) > MAX_SHIFT_M

@@ -21,10 +21,11 @@ pub(super) fn check(arm: &Arm<'_>) -> Diagnostics {
     };
     for mode in &arm.modes {
         for feature in mode.moving().filter(|feature| !passes(feature)) {
-            let Some((gate, why)) = barred(arm, mode, feature) else { continue };
+            let Some((gate, why, mend)) = barred(arm, mode, feature) else { continue };
             let message = format!("`{}` has gains, but it is never present: it passes `{gate}`, {why}", feature.name);
-            let help =
-                format!("let a gate of `{}` open in a mode that selects its column, or remove its gains", feature.name);
+            let help = mend.unwrap_or_else(|| {
+                format!("let a gate of `{}` open in a mode that selects its column, or remove its gains", feature.name)
+            });
             found.push(Diagnostic::new(Code::UnusedColumn, mode.place_of_column(feature), message).help(help));
         }
     }
@@ -63,24 +64,27 @@ fn reader(arm: &Arm<'_>, port: &str) -> Option<String> {
     node.or_else(mode)
 }
 
-/// Returns the flag that keeps a feature from moving the sensor in a mode, and why.
-fn barred<'f>(arm: &Arm<'_>, mode: &ModeLaw<'_>, feature: &'f Feature) -> Option<(&'f str, String)> {
+/// Returns the flag that keeps a feature from moving the sensor in a mode, why, and what mends it if that is known.
+fn barred<'f>(arm: &Arm<'_>, mode: &ModeLaw<'_>, feature: &'f Feature) -> Option<(&'f str, String, Option<String>)> {
     feature.gates.iter().find_map(|gate| match mode.nodes.is_set(gate) {
         Some(true) => None,
-        Some(false) => Some((&**gate, "which is set in another mode only".to_owned())),
-        None if is_without_contact(mode, gate) => Some((&**gate, "which is set without a contact only".to_owned())),
-        None => Some((&**gate, out_of_reach(arm, mode, gate)?)),
+        Some(false) => Some((&**gate, "which is set in another mode only".to_owned(), None)),
+        None if is_without_contact(mode, gate) => {
+            Some((&**gate, "which is set without a contact only".to_owned(), None))
+        }
+        None => out_of_reach(arm, mode, gate).map(|(why, mend)| (&**gate, why, Some(mend))),
     })
 }
 
-/// Returns why a comparison never sets its flag: it needs a larger force than a limit allows.
-fn out_of_reach(arm: &Arm<'_>, mode: &ModeLaw<'_>, flag: &str) -> Option<String> {
+/// Returns why a comparison never sets its flag, and what mends it: it needs a larger force than a limit allows.
+fn out_of_reach(arm: &Arm<'_>, mode: &ModeLaw<'_>, flag: &str) -> Option<(String, String)> {
     let node = mode.nodes.writer(flag).filter(|node| node.kind.text == "compare")?;
     let above = mode.nodes.number(node, "above")?;
     let port = way(&mode.nodes, source(node, "value")?).measured;
     let quantity = mode.quantity_of(&port)?;
     let (limit, key) = arm.force_limit(mode, quantity)?;
-    (above >= limit).then(|| format!("which is set above {above}, where the limit `{key}` is {limit}"))
+    let mend = format!("write `above` well below {limit} in `{}`", node.name);
+    (above >= limit).then(|| (format!("which is set above {above}, where the limit `{key}` is {limit}"), mend))
 }
 
 /// Returns whether a flag is the opposite of a contact.

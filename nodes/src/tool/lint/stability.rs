@@ -7,15 +7,15 @@ use std::ops::Range;
 use tactflow_runtime::source::{Code, Diagnostic, Diagnostics, Edit};
 
 use super::arm::Arm;
+use super::faster_filters::{Faster, faster, time_key};
 use super::mode_law::ModeLaw;
 use crate::tool::control::choose::{Wanted, factor};
 use crate::tool::control::contacts::Contact;
-use crate::tool::control::digits::{down_to_two_digits, to_two_digits};
+use crate::tool::control::digits::down_to_two_digits;
 use crate::tool::control::filters::Filter;
 use crate::tool::control::law::Feature;
 use crate::tool::control::margins::{Margins, margins, rough_margins};
 use crate::tool::control::response::Loop;
-use crate::tool::control::shape::Shape;
 
 /// What a loop has to keep over each contact.
 pub(super) const KEPT: Wanted = Wanted { peak: 1.8, gain_db: 8.0, phase_deg: 0.0 };
@@ -147,10 +147,12 @@ pub(super) fn over(object: Option<&str>) -> String {
 
 /// Returns the margins of a loop for a message.
 fn figures(margins: &Margins) -> String {
-    let peak = format!("the peak of its sensitivity is {:.1}", margins.peak_sensitivity);
-    match margins.gain_db {
-        Some(db) => format!("{peak}, and its gain margin {db:.1} dB"),
-        None => peak,
+    let peak = format!("the peak of its sensitivity is {:.2}", margins.peak_sensitivity);
+    let gain = margins.gain_db.map(|db| format!("its gain margin {db:.1} dB"));
+    let phase = margins.phase_deg.map(|phase| format!("its phase margin {}°", libm::floor(phase)));
+    match (gain, phase) {
+        (Some(gain), Some(phase)) => format!("{peak}, {gain} and {phase}"),
+        (one, other) => one.or(other).map_or_else(|| peak.clone(), |one| format!("{peak}, and {one}")),
     }
 }
 
@@ -213,8 +215,8 @@ pub(super) fn unmeasured(feature: &Feature, contacts: &[Contact], object: Option
     let quantity = feature.quantity()?;
     contact.is_by_geometry(quantity).then(|| {
         format!(
-            ". This leaves out the arm, which bears less: the bench does not say how `{quantity}` answers, and `tactflow \
-             tune` measures it"
+            ". This leaves out the arm, which bears less: begin with 3.5 1/s at most, as the recipe of docs/control.md does. \
+             The bench does not say how `{quantity}` answers, and `tactflow tune` measures it"
         )
     })
 }
@@ -256,9 +258,7 @@ fn slowest(feature: &Feature) -> Option<(usize, &Filter)> {
 
 fn slow_filter(mode: &ModeLaw<'_>, feature: &Feature, contacts: &[Contact], slow: &Found<'_>) -> Option<Diagnostic> {
     let (i, slowest) = slowest(feature)?;
-    let node = mode.nodes.node(&slowest.node)?;
-    let keys = ["time_constant_ms", "cutoff_hz", "window_ms", "window"];
-    let key = keys.into_iter().find(|key| mode.nodes.number(node, key).is_some());
+    let key = time_key(mode, slowest);
     let name = &feature.name;
     let left = match slow.judged.margins.phase_deg.filter(|_| slow.judged.margins.is_stable) {
         Some(phase) => format!("a phase margin of {}° is left", libm::floor(phase)),
@@ -274,37 +274,18 @@ fn slow_filter(mode: &ModeLaw<'_>, feature: &Feature, contacts: &[Contact], slow
     );
     let place = mode.place(&slowest.node, key.unwrap_or_default());
     let diagnostic = Diagnostic::new(Code::SlowFilter, place.clone(), message);
-    let share = faster(feature, contacts, i);
-    let Some(((key, old), share)) = key.and_then(|key| Some((key, mode.nodes.number(node, key)?))).zip(share) else {
-        return Some(diagnostic.help("use a faster filter, or smaller gains"));
-    };
-    let (value, more) = match key {
-        // Rounded up.
-        "cutoff_hz" => (to_two_digits(old / share, libm::ceil), "more"),
-        "window" => (libm::floor(old * share).max(1.0), "less"),
-        _ => (down_to_two_digits(old * share), "less"),
-    };
-    let help = format!("write `{key} = {value}` or {more} in `{}`, or smaller gains of `{name}`", slowest.node);
-    let diagnostic = diagnostic.help(help);
-    // A default is written nowhere, so it has no text to replace.
-    Some(if place == node.span { diagnostic } else { diagnostic.edit(Edit::Replace(place, format!("{value}"))) })
-}
-
-/// Returns the part of the delay of a filter with which the loop is good over all contacts.
-fn faster(feature: &Feature, contacts: &[Contact], i: usize) -> Option<f64> {
-    let is_good = |feature: &Feature| {
+    let changes = faster(mode, feature, i, |feature| {
         let mut loops = contacts.iter().filter_map(|contact| Loop::over(feature, contact));
         loops.all(|around| judge_loop(feature, &around).is_good())
-    };
-    let shares = std::iter::successors(Some(0.8), |share| Some(share * 0.8)).take(20);
-    shares.into_iter().find(|share| {
-        let mut feature = feature.clone();
-        let Filter { shape, .. } = &mut feature.filters[i];
-        match shape {
-            Shape::LowPass { time } => *time *= share,
-            Shape::Mean { samples } | Shape::Median { samples } => *samples = libm::floor(*samples * share).max(1.0),
-            Shape::Delay { .. } => {}
-        }
-        is_good(&feature)
-    })
+    });
+    let Some(changes) = changes else { return Some(diagnostic.help("use faster filters, or smaller gains")) };
+    let text: Vec<String> = changes.iter().map(Faster::text).collect();
+    let help = format!("write {}, or smaller gains of `{name}`", text.join(" and "));
+    // A default is written nowhere, so it has no text to replace.
+    let written = changes.into_iter().filter(|change| !change.is_default);
+    Some(
+        written.fold(diagnostic.help(help), |diagnostic, change| {
+            diagnostic.edit(Edit::Replace(change.place, change.value))
+        }),
+    )
 }
