@@ -15,7 +15,10 @@ use tactflow_tests::{catalogue, toml_files, workspace};
 
 use columns::{HALF_TURN, more_wrong_columns, wrong_columns};
 use good::{good, good_at_second_sight, good_behind_nodes, good_by_modes, good_by_turns};
-use poor::{at_second_sight, never_reached, opposed, poor_behind_nodes, poor_gains, poor_modes, poor_sums};
+use poor::{
+    at_second_sight, never_reached, opposed, poor_behind_nodes, poor_filters_and_motions, poor_gains, poor_modes,
+    poor_sums,
+};
 use variant::{graph, variant};
 
 fn codes(report: Option<&Report>) -> BTreeSet<&'static str> {
@@ -41,6 +44,7 @@ fn each_poor_controller_gets_its_warning_and_no_other() {
         opposed(),
         never_reached(),
         at_second_sight(),
+        poor_filters_and_motions(),
     ];
     let poor: Vec<_> = poor.into_iter().flatten().collect();
     assert!(poor.len() > 50, "{}", poor.len());

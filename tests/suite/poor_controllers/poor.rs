@@ -398,6 +398,22 @@ pub(super) fn at_second_sight() -> Vec<(&'static str, Variant)> {
                 ],
             ),
         ),
+        // What an operator may set while the arm moves.
+        ("low-margin", variant("hybrid", &["set live.pid.gains.y.kp.max=20.0"])),
+        // Without a larger gain that keeps the margins.
+        (
+            "low-margin",
+            variant(
+                "hybrid",
+                &["gains.x = { kp = 3.3, ki = 0.0 }", "set live.pid.gains.x.ki={ min = 0.0, max = 500.0, rate = 1.0 }"],
+            ),
+        ),
+    ]
+}
+
+/// Filters that are too short or too long together, and motions that last beside a control.
+pub(super) fn poor_filters_and_motions() -> Vec<(&'static str, Variant)> {
+    vec![
         // The median of three samples lets as much noise pass as the mean of two.
         (
             "unfiltered-derivative",
@@ -445,16 +461,6 @@ pub(super) fn at_second_sight() -> Vec<(&'static str, Variant)> {
                     "set modes.servo.go={ to = \"rest\", after_ms = 4000 }",
                     "set modes.rest.on_lost={ of = \"touch.present\", after_ms = 100, to = \"approach\" }",
                 ],
-            ),
-        ),
-        // What an operator may set while the arm moves.
-        ("low-margin", variant("hybrid", &["set live.pid.gains.y.kp.max=20.0"])),
-        // Without a larger gain that keeps the margins.
-        (
-            "low-margin",
-            variant(
-                "hybrid",
-                &["gains.x = { kp = 3.3, ki = 0.0 }", "set live.pid.gains.x.ki={ min = 0.0, max = 500.0, rate = 1.0 }"],
             ),
         ),
     ]
