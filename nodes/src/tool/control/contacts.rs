@@ -90,17 +90,8 @@ impl Answer {
         self.latency_ms.into_iter().chain(late).reduce(f64::max).map(|lag| (10.0 * lag).round() / 10.0)
     }
 
-    /// Returns the wrong point of the response: the first one without which the others are right, or else the first that
-    /// is none or that comes before a slower one.
-    fn bad_point(&self) -> Option<[f64; 3]> {
-        let points = &self.response;
-        let first = first_bad(points.iter())?;
-        let alone = (0..points.len()).find(|&i| first_bad(points[..i].iter().chain(&points[i + 1..])).is_none());
-        alone.map(|i| points[i]).or(Some(first))
-    }
-
     fn check(&self, feature: &str) -> Result<(), String> {
-        if let Some(point) = self.bad_point() {
+        if let Some(point) = wrong_point(&self.response).map(|i| self.response[i]) {
             return Err(format!(
                 "`response` of `{feature}` has the point {point:?}: write [Hz, multiple, deg] for frequencies from low to high, \
                  such as [4.0, 1.5, -30], with a multiple greater than 0"
@@ -121,15 +112,22 @@ impl Answer {
     }
 }
 
-/// Returns the first point of a response that is none, or that comes before a slower one.
-fn first_bad<'a>(mut points: impl Iterator<Item = &'a [f64; 3]>) -> Option<[f64; 3]> {
+/// Returns the number of the wrong point of a response: the first one that is none or that comes before a slower one, or
+/// the one before it if the others are right without that.
+pub(crate) fn wrong_point(points: &[[f64; 3]]) -> Option<usize> {
+    let first = first_bad(points.iter())?;
+    let is_alone = |i: &usize| first_bad(points[..*i].iter().chain(&points[i + 1..])).is_none();
+    Some(first.checked_sub(1).filter(is_alone).unwrap_or(first))
+}
+
+/// Returns the number of the first point of a response that is none, or that comes before a slower one.
+fn first_bad<'a>(mut points: impl Iterator<Item = &'a [f64; 3]>) -> Option<usize> {
     let mut last = 0.0;
-    let is_bad = |[hz, multiple, phase]: &&[f64; 3]| {
+    points.position(|[hz, multiple, phase]| {
         let is_good = *hz > last && *hz <= MAX_HZ && *multiple > 0.0 && multiple.is_finite() && phase.is_finite();
         last = *hz;
         !is_good
-    };
-    points.find(is_bad).copied()
+    })
 }
 
 impl Contact {
@@ -184,6 +182,11 @@ pub(crate) fn contacts(facts: &[(String, toml::Value)], arm: &str) -> Result<Vec
         let why = why.trim_end();
         format!("`contacts` in `[facts.{arm}]` of the bench: {why}\nwrite, for example, `{example}`")
     };
+    if value.is_table() {
+        return Err(format!(
+            "`contacts` is one table here: write `[[facts.{arm}.contacts]]` with two brackets, once for each object"
+        ));
+    }
     let contacts: Vec<Contact> = value.clone().try_into().map_err(|error: toml::de::Error| wrong(error.to_string()))?;
     for contact in &contacts {
         contact.check().map_err(|why| wrong(format!("{}: {why}", contact.object)))?;

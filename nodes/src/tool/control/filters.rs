@@ -42,9 +42,11 @@ impl Way {
     }
 }
 
-/// Returns the delay of the filters that smooth [s].
+/// Returns the delay of the filters that smooth [s]. That of a median counts half: the median of three samples lets as
+/// much noise pass as the mean of two.
 pub(crate) fn smoothing(filters: &[Filter]) -> f64 {
-    filters.iter().filter(|filter| filter.shape.smooths()).map(|filter| filter.delay_s).sum()
+    let smooth = filters.iter().filter(|filter| filter.shape.smooths());
+    smooth.map(|filter| if matches!(filter.shape, Shape::Median { .. }) { 0.5 } else { 1.0 } * filter.delay_s).sum()
 }
 
 /// Follows a feature back to its measurement.

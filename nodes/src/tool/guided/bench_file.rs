@@ -10,6 +10,8 @@ use tactflow_runtime::signal::Joint;
 use tempfile::NamedTempFile;
 use toml_edit::{Array, ArrayOfTables, DocumentMut, Item, Table, TableLike, Value};
 
+use super::tables::{comments, headed, update};
+
 /// The text of a bench, and what is to be changed in it.
 #[derive(Debug, Clone)]
 pub(crate) struct BenchFile {
@@ -79,8 +81,9 @@ impl BenchFile {
         Ok(())
     }
 
-    /// Sets a list of tables in a section: `[[facts.arm.contacts]]` for the key `contacts` of `["facts", "arm"]`. The
-    /// comments above the old tables stay.
+    /// Sets a list of tables in a section: `[[facts.arm.contacts]]` for the key `contacts` of `["facts", "arm"]`. What
+    /// stays equal is left as it is written, and comments stay. Those within a list of inline tables stand above the first
+    /// table.
     ///
     /// # Errors
     /// If something on the way is no table.
@@ -88,13 +91,14 @@ impl BenchFile {
         self.changes.push((String::new(), headed(section, key, tables.clone())));
         let is_new = section.iter().try_fold(self.document.as_item(), |item, name| item.get(name)).is_none();
         let table = self.table(section)?;
-        match table.get(key) {
-            Some(Item::ArrayOfTables(old)) => tables.iter_mut().zip(old.iter()).for_each(|(new, old)| keep(new, old)),
-            Some(_) => {
-                let above = table.key(key).and_then(|key| key.leaf_decor().prefix()).cloned();
-                tables.iter_mut().take(1).for_each(|new| new.decor_mut().set_prefix(above.clone().unwrap_or_default()));
-            }
-            None => {}
+        if let Some(Item::ArrayOfTables(old)) = table.get_mut(key) {
+            let known = old.len();
+            old.iter_mut().zip(tables.iter()).for_each(|(old, new)| update(old, new));
+            tables.into_iter().skip(known).for_each(|new| old.push(new));
+            return Ok(());
+        }
+        if let (Some(above), Some(first)) = (comments(table, key), tables.get_mut(0)) {
+            first.decor_mut().set_prefix(above);
         }
         table.remove(key);
         table.insert(key, Item::ArrayOfTables(tables));
@@ -238,31 +242,6 @@ fn push(list: &mut Array, mut value: Value) {
     list.push_formatted(value);
 }
 
-/// Returns a list of tables as it stands in a file, without the section around it.
-pub(crate) fn headed(section: &[&str], key: &str, tables: ArrayOfTables) -> String {
-    let inner = (key, Item::ArrayOfTables(tables));
-    let outer = section.iter().rev().fold(inner, |(key, item), name| {
-        let mut table = Table::new();
-        table.set_implicit(true);
-        table.insert(key, item);
-        (name, Item::Table(table))
-    });
-    let mut text = DocumentMut::new();
-    text.insert(outer.0, outer.1);
-    text.to_string().trim().to_owned()
-}
-
-/// Gives a table, and those in it, the comments and the place of old ones.
-fn keep(new: &mut Table, old: &Table) {
-    *new.decor_mut() = old.decor().clone();
-    new.set_position(old.position());
-    for (key, item) in new.iter_mut() {
-        if let (Item::Table(new), Some(Item::Table(old))) = (item, old.get(&key)) {
-            keep(new, old);
-        }
-    }
-}
-
 /// Returns a list of numbers, each rounded to a number of decimals.
 pub(crate) fn numbers(list: &[f64], decimals: i32) -> Array {
     let scale = 10.0_f64.powi(decimals);
@@ -380,8 +359,17 @@ linear_m_per_s = 0.05
                  [facts.arm.contacts.pressure]\nvz = 7.0\n\n[limits]\n",
             ),
             (
-                "\n# Mine.\n[[facts.arm.contacts]]\nobject = \"box\"\n\n# Soft.\n[facts.arm.contacts.pressure]\nvz = 1.0\n\n[limits]\n",
-                "\n# Mine.\n[[facts.arm.contacts]]\nobject = \"pen\"\n\n# Soft.\n[facts.arm.contacts.pressure]\nvz = 7.0\n\n[limits]\n",
+                "\n# Mine.\n[[facts.arm.contacts]]\nobject = \"pen\" # a\n\n# Soft.\n[facts.arm.contacts.pressure]\n# b\nvz = 1.0 # c\n\n[limits]\n",
+                "\n# Mine.\n[[facts.arm.contacts]]\nobject = \"pen\" # a\n\n# Soft.\n[facts.arm.contacts.pressure]\n# b\nvz = 7.0 # c\n\n[limits]\n",
+            ),
+            (
+                "\n[facts.arm]\ncontacts = [\n  # a\n  { object = \"pen\" }, # b\n] # c\n\n[limits]\n",
+                "\n[facts.arm]\n# a\n# b\n# c\n[[facts.arm.contacts]]\nobject = \"pen\"\n\n\
+                 [facts.arm.contacts.pressure]\nvz = 7.0\n\n[limits]\n",
+            ),
+            (
+                "\n[[facts.arm.contacts]]\nobject = \"pen\"\npressure = { vz = 7.0 } # mine\n\n[limits]\n",
+                "\n[[facts.arm.contacts]]\nobject = \"pen\"\npressure = { vz = 7.0 } # mine\n\n[limits]\n",
             ),
         ];
         for (before, after) in cases {

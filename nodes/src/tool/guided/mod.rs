@@ -4,6 +4,7 @@
 mod arm;
 mod bench_file;
 pub(super) mod mount;
+mod tables;
 pub(super) mod vectors;
 
 use std::io::BufRead;
@@ -20,7 +21,8 @@ use tactflow_runtime::signal::Signal;
 use tactflow_runtime::source::quoted;
 
 pub(super) use arm::{GuidedArm, StillPosture, chain};
-pub(super) use bench_file::{BenchFile, headed, joint_numbers, numbers};
+pub(super) use bench_file::{BenchFile, joint_numbers, numbers};
+pub(super) use tables::headed;
 
 /// Longest time between two looks at the devices, which wake the thread when they sample.
 const LOOK: Duration = Duration::from_millis(1);

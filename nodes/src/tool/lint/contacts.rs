@@ -3,17 +3,22 @@
 use std::ops::Range;
 
 use tactflow_runtime::graph::{NO_SPAN, Outline};
-use tactflow_runtime::source::{Code, Diagnostic, Diagnostics, Edit, Item, Value, suggest_name};
+use tactflow_runtime::source::{Code, Diagnostic, Diagnostics, Edit, Item, Key, Table, Value, suggest_name};
 
 use super::arm::Arm;
-use crate::tool::control::contacts::{Contact, contacts};
+use crate::tool::control::contacts::{Contact, contacts, wrong_point};
 use crate::tool::control::law::Feature;
 
 /// Returns the warning about the contacts of an arm that cannot be read, and why.
 pub(super) fn unreadable(outline: &Outline, arm: &str, why: String) -> Diagnostic {
     let name = format!("{arm}.contacts");
     let value = outline.facts.iter().find(|(fact, _)| *fact == name).map(|(_, value)| value);
-    let place = value.map_or(NO_SPAN, |value| place(&name, arm, value, &why));
+    let read = |value: &Value| {
+        let fact = toml::Value::try_from(value).map(|value| [(name.clone(), value)]);
+        fact.map_or(Ok(()), |fact| contacts(&fact, arm).map(drop))
+    };
+    let whole = value.map_or(NO_SPAN, |value| value.span.clone());
+    let (place, why) = value.and_then(|value| wrong(value, &read)).unwrap_or((whole, why));
     let message = format!("no loop of `{arm}` is checked over a contact, because its contacts cannot be read");
     Diagnostic::new(Code::UnusualValue, place, message).help(why)
 }
@@ -50,73 +55,44 @@ pub(super) fn misnamed(arm: &Arm<'_>) -> Diagnostics {
     found.collect()
 }
 
-/// Returns the place of the mistake: the key that is not known, or the smallest value without which the contacts can be
-/// read, or else the first contact that cannot be read by itself.
-fn place(name: &str, arm: &str, value: &Value, why: &str) -> Range<usize> {
-    let is_wrong = |value: &Value| {
-        let fact = toml::Value::try_from(value).map(|value| [(name.to_owned(), value)]);
-        fact.is_ok_and(|fact| contacts(&fact, arm).is_err())
-    };
-    let alone = |entry: &&Value| is_wrong(&Value { item: Item::Array(vec![(*entry).clone()]), ..value.clone() });
-    let entry = children(value).into_iter().find(alone).unwrap_or(value);
+/// Returns the first contact that cannot be read, with the place of the mistake in it and why.
+fn wrong(value: &Value, read: &impl Fn(&Value) -> Result<(), String>) -> Option<(Range<usize>, String)> {
+    let Item::Array(entries) = &value.item else { return None };
+    let alone = |entry: &Value| Value { item: Item::Array(vec![entry.clone()]), span: value.span.clone() };
+    let (entry, why) = entries.iter().find_map(|entry| Some((entry, read(&alone(entry)).err()?)))?;
     let unknown = why.split_once("unknown field `").and_then(|(_, rest)| rest.split_once('`'));
     let key = unknown.and_then(|(key, _)| key_in(entry, key));
-    key.unwrap_or_else(|| culprit(value, &is_wrong).unwrap_or(entry).span.clone())
+    let is_wrong = |entry: &Value| read(&alone(entry)).is_err();
+    Some((key.unwrap_or_else(|| innermost(entry, &is_wrong).span.clone()), why))
 }
 
-/// Returns the innermost value without which the whole is right. In a list with several mistakes that is the first one:
-/// what follows it is left out. `None` if there is no such value.
-fn culprit<'a>(whole: &'a Value, is_wrong: &impl Fn(&Value) -> bool) -> Option<&'a Value> {
-    let (mut at, mut path) = (None, Vec::new());
-    loop {
-        let inner = children(at.unwrap_or(whole));
-        let mends = |i: &usize| !is_wrong(&edited(whole, &path, |item| remove(item, *i)));
-        let Some(i) = (0..inner.len()).find(mends) else {
-            let ends_well = |count: usize| !is_wrong(&edited(whole, &path, |item| truncate(item, count)));
-            let first = (0..inner.len()).find(|i| ends_well(*i) && !ends_well(i + 1));
-            return first.map(|i| inner[i]).or(at);
-        };
-        at = Some(inner[i]);
-        path.push(i);
+/// Returns the innermost value with which a contact alone is wrong: a point of a response, a number, or a feature.
+fn innermost<'a>(entry: &'a Value, is_wrong: &impl Fn(&Value) -> bool) -> &'a Value {
+    let table = |entries: Vec<(Key, Value)>| Value { item: Item::Table(Table { entries }), span: entry.span.clone() };
+    let object = || of(entry).iter().filter(|(key, _)| key.name == OBJECT).cloned();
+    if is_wrong(&table(object().collect())) {
+        return entry.as_table().and_then(|table| table.get(OBJECT)).unwrap_or(entry);
     }
+    let beside = |key: &Key, value: Value| table(object().chain([(key.clone(), value)]).collect());
+    let features = of(entry).iter().filter(|(key, _)| key.name != OBJECT);
+    let Some((key, feature)) = features.into_iter().find(|(key, value)| is_wrong(&beside(key, value.clone()))) else {
+        return entry;
+    };
+    let is_wrong_alone = |one: &&(Key, Value)| is_wrong(&beside(key, table(vec![(*one).clone()])));
+    let Some((_, number)) = of(feature).iter().find(is_wrong_alone) else { return feature };
+    let Item::Array(points) = &number.item else { return number };
+    let read: Vec<Option<[f64; 3]>> = points.iter().map(Value::read).collect();
+    let known: Vec<[f64; 3]> = read.iter().copied().map_while(|point| point).collect();
+    let wrong = if known.len() < points.len() { Some(known.len()) } else { wrong_point(&known) };
+    wrong.map_or(number, |i| &points[i])
 }
 
-/// Returns the values in a list or a table, in their order.
-fn children(value: &Value) -> Vec<&Value> {
-    match &value.item {
-        Item::Array(items) => items.iter().collect(),
-        Item::Table(table) => table.entries.iter().map(|(_, value)| value).collect(),
-        _ => Vec::new(),
-    }
-}
+/// Key of the name of an object.
+const OBJECT: &str = "object";
 
-/// Returns a value in which the item at a path of positions is changed.
-fn edited(whole: &Value, path: &[usize], change: impl FnOnce(&mut Item)) -> Value {
-    let mut rest = whole.clone();
-    let mut at = &mut rest;
-    for &i in path {
-        at = match &mut at.item {
-            Item::Array(items) => &mut items[i],
-            Item::Table(table) => &mut table.entries[i].1,
-            _ => return rest,
-        };
-    }
-    change(&mut at.item);
-    rest
-}
-
-fn remove(item: &mut Item, i: usize) {
-    match item {
-        Item::Array(items) => drop(items.remove(i)),
-        Item::Table(table) => drop(table.entries.remove(i)),
-        _ => {}
-    }
-}
-
-fn truncate(item: &mut Item, count: usize) {
-    if let Item::Array(items) = item {
-        items.truncate(count);
-    }
+/// Returns the entries of a table.
+fn of(value: &Value) -> &[(Key, Value)] {
+    value.as_table().map_or(&[], |table| &table.entries)
 }
 
 /// Returns the place of a key in a value.

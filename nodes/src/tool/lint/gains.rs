@@ -10,7 +10,6 @@ use super::reach::unreachable;
 use crate::tool::control::contacts::Answer;
 use crate::tool::control::digits::to_two_digits;
 use crate::tool::control::law::Feature;
-use crate::tool::control::shape::Shape;
 
 pub(super) fn check(arm: &Arm<'_>) -> Diagnostics {
     let mut found = Diagnostics::new();
@@ -96,20 +95,15 @@ fn unfiltered(mode: &ModeLaw<'_>, feature: &Feature) -> Option<Diagnostic> {
     let period = feature.period_s;
     // The difference of two samples has √2 times their noise.
     let factor = 2.0_f64.sqrt() * feature.kd / period;
-    // The median of three samples lets as much noise pass as the mean of two.
-    let medians = feature.filters.iter().filter(|filter| matches!(filter.shape, Shape::Median { .. }));
-    let smoothing = feature.least_smoothing() - 0.5 * medians.map(|median| median.delay_s).sum::<f64>();
+    let is_smooth = |smoothing: f64| smoothing >= period * (1.0 - 1e-9);
     // A filter of less than a period smooths nothing, and a share below that of `kp` does no harm.
-    if smoothing >= period * (1.0 - 1e-9) || factor <= feature.kp {
+    if is_smooth(feature.least_smoothing()) || factor <= feature.kp {
         return None;
     }
     mode.quantity(feature)?;
     let name = &feature.name;
-    let is_switched = feature.least_smoothing() < feature.smoothing();
-    let filter = match smoothing > 0.0 {
-        true if !is_switched => "behind a short filter",
-        _ => "without a filter",
-    };
+    let is_switched = is_smooth(feature.smoothing());
+    let filter = if feature.least_smoothing() > 0.0 { "behind a short filter" } else { "without a filter" };
     let side = if is_switched { " on one side of a `switch`" } else { "" };
     let message = format!(
         "`kd` of `{name}` differentiates a signal {filter}{side}: the noise of a sample moves the sensor with a gain of \
@@ -167,8 +161,8 @@ fn windup(arm: &Arm<'_>, mode: &ModeLaw<'_>, feature: &Feature) -> Option<Diagno
     }
     let name = &feature.name;
     let message = format!(
-        "the integral of `{name}` grows at every error that occurs, until it alone moves the sensor at full speed: it winds up while \
-         the object is far, and overshoots"
+        "the integral of `{name}` grows at every error that occurs. At last it alone moves the sensor at full speed: it \
+         winds up while the object is far, and overshoots"
     );
     let within = if number("within").is_some() { "a smaller `within`" } else { "`within`" };
     let help = format!("write {within} in the gains of `{name}`, about five times its noise");

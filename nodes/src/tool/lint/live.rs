@@ -83,7 +83,8 @@ impl<'a> Changed<'a> {
         let best = best.filter(|best| *best > self.value);
         let found = match best {
             Some(best) => {
-                let why = unmeasured(self.feature, contacts, shaken.name()).unwrap_or_default();
+                let kp = Some(best).filter(|_| self.key == "kp");
+                let why = unmeasured(self.feature, contacts, shaken.name(), kp).unwrap_or_default();
                 let help = format!("write `max = {best}` or less{why}");
                 diagnostic.help(help).edit(Edit::Replace(range.span.clone(), format!("{best:?}")))
             }

@@ -173,7 +173,7 @@ fn low_margin(
     let diagnostic = match slowest(feature).filter(|_| low.judged.lag > MAX_LAG) {
         Some((_, filter)) => diagnostic.note(
             mode.place(&filter.node, ""),
-            format!("the filters delay `{name}` by {:.0} ms in all, most of them this one", feature.smoothing() * 1e3),
+            format!("the filters delay `{name}` by {:.0} ms in all, most of them this one", feature.delay() * 1e3),
         ),
         None => diagnostic,
     };
@@ -201,7 +201,7 @@ fn low_margin(
     let gains = gains.map(|(key, gain)| (key, down_to_two_digits(gain * factor)));
     let written = gains.iter().filter(|(_, gain)| *gain != 0.0);
     let text: Vec<String> = written.clone().map(|(key, gain)| format!("`{key} = {gain}`")).collect();
-    let why = unmeasured(feature, contacts, low.object).unwrap_or_default();
+    let why = unmeasured(feature, contacts, low.object, Some(feature.kp * factor)).unwrap_or_default();
     let help = format!("write {} or less in the gains of `{name}`{why}", text.join(" and "));
     let places: Vec<_> = written.map(|(key, gain)| (mode.place_of_gain(feature, key), gain)).collect();
     places.into_iter().fold(diagnostic.help(help), |diagnostic, (place, gain)| {
@@ -209,16 +209,27 @@ fn low_margin(
     })
 }
 
-/// Returns what to say of gains that are chosen by geometry, because the bench does not say how the object answers.
-pub(super) fn unmeasured(feature: &Feature, contacts: &[Contact], object: Option<&str>) -> Option<String> {
+/// Gain of a loop with which the recipe of docs/control.md begins [1/s].
+const FIRST_GAIN: f64 = 3.5;
+
+/// Returns what to say of gains that are chosen by geometry, because the bench does not say how the object answers. A
+/// `kp` above that of the recipe is not named without it.
+pub(super) fn unmeasured(
+    feature: &Feature,
+    contacts: &[Contact],
+    object: Option<&str>,
+    kp: Option<f64>,
+) -> Option<String> {
     let contact = contacts.iter().find(|contact| contact.name() == object)?;
-    let quantity = feature.quantity()?;
-    contact.is_by_geometry(quantity).then(|| {
-        format!(
-            ". This leaves out the arm, which bears less: begin with 3.5 1/s at most, as the recipe of docs/control.md does. \
-             The bench does not say how `{quantity}` answers, and `tactflow tune` measures it"
-        )
-    })
+    let quantity = feature.quantity().filter(|quantity| contact.is_by_geometry(quantity))?;
+    let first = FIRST_GAIN / contact.answer(quantity)?.along(&feature.column).abs();
+    let begin = kp.filter(|kp| first < *kp).map_or_else(String::new, |_| {
+        format!("Begin with `kp = {}`, as in the recipe of docs/control.md. ", down_to_two_digits(first))
+    });
+    Some(format!(
+        ". This number leaves out the arm, so the true one is smaller. {begin}The bench does not say how `{quantity}` answers: \
+         `tactflow tune` measures it"
+    ))
 }
 
 /// Returns what to say of each schedule that makes the gains larger over an object.
