@@ -1,7 +1,7 @@
 //! Controllers as an integrator may write them.
 
 use super::columns::HALF_TURN;
-use super::variant::{Variant, cleared, compared, graph, search, variant, with_feature};
+use super::variant::{Variant, cleared, compared, graph, search, variant, with_area, with_feature};
 
 /// The lines of all gains of a task, with each `kp` and `ki` times a factor.
 fn scaled(task: &'static str, factor: f64) -> Vec<String> {
@@ -160,12 +160,7 @@ pub(super) fn good_at_second_sight() -> Vec<Variant> {
             "area",
             "size.interpolated",
             "[0, 0, 0.1, 0, 0, 0]",
-            &[
-                "set nodes.size.type=\"contact_area\"",
-                "set nodes.size.in.image=\"touch.repaired\"",
-                "set nodes.size.in.region=\"touch.region\"",
-                "set nodes.size.threshold=0.01",
-            ],
+            &with_area(&["set nodes.size.threshold=0.01"]),
         ),
         // A line is held for a moment only.
         with_feature(

@@ -1,6 +1,6 @@
 //! Controllers with one mistake, each with the code of its warning.
 
-use super::variant::{Variant, cleared, compared, gated, on, search, variant, with_feature};
+use super::variant::{Variant, cleared, compared, gated, on, search, variant, with_area, with_feature};
 
 /// Mistakes that nodes between the feature and the motion hide from a first look.
 pub(super) fn poor_behind_nodes() -> Vec<(&'static str, Variant)> {
@@ -371,32 +371,11 @@ pub(super) fn at_second_sight() -> Vec<(&'static str, Variant)> {
             ),
         ),
         // Without a threshold there is no interpolated area.
-        (
-            "unused-column",
-            with_feature(
-                "hybrid",
-                "area",
-                "size.interpolated",
-                "[0, 0, 0.1, 0, 0, 0]",
-                &[
-                    "set nodes.size.type=\"contact_area\"",
-                    "set nodes.size.in.image=\"touch.repaired\"",
-                    "set nodes.size.in.region=\"touch.region\"",
-                ],
-            ),
-        ),
+        ("unused-column", with_feature("hybrid", "area", "size.interpolated", "[0, 0, 0.1, 0, 0, 0]", &with_area(&[]))),
         // Nor where a mode waits for it.
         (
             "unused-column",
-            variant(
-                "hybrid",
-                &[
-                    "set nodes.size.type=\"contact_area\"",
-                    "set nodes.size.in.image=\"touch.repaired\"",
-                    "set nodes.size.in.region=\"touch.region\"",
-                    "set modes.servo.done={ when = \"size.interpolated\", above = 0.001 }",
-                ],
-            ),
+            variant("hybrid", &with_area(&["set modes.servo.done={ when = \"size.interpolated\", above = 0.001 }"])),
         ),
         // What an operator may set while the arm moves.
         ("low-margin", variant("hybrid", &["set live.pid.gains.y.kp.max=20.0"])),

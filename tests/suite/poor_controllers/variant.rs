@@ -118,6 +118,16 @@ pub(super) fn compared(bound: &str) -> [&str; 7] {
     ]
 }
 
+/// The changes that add a `contact_area`, and more.
+pub(super) fn with_area(more: &[&'static str]) -> Vec<&'static str> {
+    let own = [
+        "set nodes.size.type=\"contact_area\"",
+        "set nodes.size.in.image=\"touch.repaired\"",
+        "set nodes.size.in.region=\"touch.region\"",
+    ];
+    [&own, more].concat()
+}
+
 /// A task that controls a feature more, with a setpoint of 0 and a gain of 1 1/s.
 pub(super) fn with_feature(task: &'static str, name: &str, port: &str, column: &str, changes: &[&str]) -> Variant {
     let more = [

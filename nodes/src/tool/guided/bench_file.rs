@@ -82,8 +82,8 @@ impl BenchFile {
     }
 
     /// Sets a list of tables in a section: `[[facts.arm.contacts]]` for the key `contacts` of `["facts", "arm"]`. What
-    /// stays equal is left as it is written, and comments stay. Those within a list of inline tables stand above the first
-    /// table.
+    /// stays equal is left as it is written. Comments stay, except within a list of numbers that changes. Those of inline
+    /// tables stand above the tables that take their place.
     ///
     /// # Errors
     /// If something on the way is no table.
@@ -366,6 +366,10 @@ linear_m_per_s = 0.05
                 "\n[facts.arm]\ncontacts = [\n  # a\n  { object = \"pen\" }, # b\n] # c\n\n[limits]\n",
                 "\n[facts.arm]\n# a\n# b\n# c\n[[facts.arm.contacts]]\nobject = \"pen\"\n\n\
                  [facts.arm.contacts.pressure]\nvz = 7.0\n\n[limits]\n",
+            ),
+            (
+                "\n[[facts.arm.contacts]]\nobject = \"pen\"\npressure = { vz = 1.0 } # mine\n\n[limits]\n",
+                "\n[[facts.arm.contacts]]\nobject = \"pen\"\n\n# mine\n[facts.arm.contacts.pressure]\nvz = 7.0\n\n[limits]\n",
             ),
             (
                 "\n[[facts.arm.contacts]]\nobject = \"pen\"\npressure = { vz = 7.0 } # mine\n\n[limits]\n",

@@ -16,19 +16,26 @@ pub(crate) fn headed(section: &[&str], key: &str, tables: ArrayOfTables) -> Stri
     text.to_string().trim().to_owned()
 }
 
-/// Changes a table into another one. What is equal stays as it is written, and so does what stands around the rest.
+/// Changes a table into another one. What is equal stays as it is written, and so do the comments around the rest.
 pub(super) fn update(old: &mut Table, new: &Table) {
     old.retain(|key, _| new.contains_key(key));
     for (key, new) in new {
-        match old.get_mut(key) {
-            Some(known) if plain(known) == plain(new) => {}
-            Some(Item::Table(known)) if new.is_table() => new.as_table().into_iter().for_each(|new| update(known, new)),
-            Some(Item::Value(known)) if new.is_value() => {
+        let above = comments(old, key);
+        match (old.get_mut(key), new) {
+            (Some(known), new) if plain(known) == plain(new) => {}
+            (Some(Item::Table(known)), Item::Table(new)) => update(known, new),
+            (Some(Item::Value(known)), Item::Value(new)) => {
                 let decor = known.decor().clone();
-                new.as_value().into_iter().for_each(|new| *known = new.clone());
+                *known = new.clone();
                 *known.decor_mut() = decor;
             }
-            _ => drop(old.insert(key, new.clone())),
+            (_, new) => {
+                let mut new = new.clone();
+                if let (Some(above), Item::Table(new)) = (above, &mut new) {
+                    new.decor_mut().set_prefix(format!("\n{above}"));
+                }
+                old.insert(key, new);
+            }
         }
     }
 }
