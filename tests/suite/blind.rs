@@ -102,6 +102,31 @@ fn a_lost_contact_ends_a_cycle_of_its_own_arm_only() {
     assert!(codes("left_touch.present", 100).contains(&"ungated-motion"), "the left arm may have its contact");
 }
 
+#[test]
+fn a_gate_that_is_the_flag_of_a_mode_is_open_in_that_mode_alone() {
+    // The modes `seek` and `turn` of this task can follow each other without a contact.
+    let codes = |mode: &str, more: &[&str]| {
+        let signal = [
+            "nodes.signal={ type = 'signal_generator', form = 'sine', unit = 'm/s', amplitude = 0.001, frequency = 1.0 }",
+            "nodes.shake={ type = 'compose_twist', in.vx = 'signal.value' }",
+            "nodes.sum.in.shake='shake.twist'",
+        ];
+        let request = Request::file(workspace().join("graphs/seek_ridge.toml"));
+        let request = request.set(format!("nodes.signal.in.gate='{mode}'"));
+        let request = signal.iter().chain(more).fold(request, |request, set| request.set(*set));
+        let diagnostics = compile(&catalogue(), &request).err().map_or_else(Vec::new, |report| report.diagnostics);
+        diagnostics.into_iter().map(|diagnostic| diagnostic.code.name()).collect::<Vec<_>>()
+    };
+    assert!(codes("modes.press", &[]).is_empty() && codes("modes.follow", &[]).is_empty());
+    assert_eq!(codes("modes.seek", &[]), ["ungated-motion"]);
+    // What turns a flag around, or adds other ones, is open in other modes too.
+    let not = "nodes.other={ type = 'not', in.flag = 'modes.press' }";
+    let any = "nodes.other={ type = 'any', in.press = 'modes.press', in.seek = 'modes.seek' }";
+    for other in [not, any] {
+        assert_eq!(codes("other.is_met", &[other]), ["ungated-motion"], "{other}");
+    }
+}
+
 /// A right arm whose motion reads the force of the left arm's limiter, and whose guidance has this gate.
 fn coupled(gate: &str) -> Request {
     let blocks = [

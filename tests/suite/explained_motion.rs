@@ -250,6 +250,52 @@ fn the_estimate_of_a_run_is_near_what_the_bench_states() {
     }
 }
 
+/// The way of the sensor between both crossings of the middle of a place that a slow sine moves to and fro, without its
+/// controller [m].
+fn hysteresis(task: &str, bench: &str, place: &str, amplitude: f64, more: &[&str]) -> f64 {
+    let [graph, bench] = [format!("graphs/{task}.toml"), format!("graphs/benches/{bench}.toml")];
+    let speed = 0.1 * TAU * amplitude;
+    let signal = format!(
+        "nodes.slow={{ type = 'signal_generator', in.gate = 'modes.servo', form = 'sine', unit = 'm/s', amplitude = \
+         {speed:?}, frequency = 0.1 }}"
+    );
+    let twist = format!("nodes.sway={{ type = 'compose_twist', in.v{place} = 'slow.value' }}");
+    let alone = format!("nodes.jacobian.columns.{place}=[0, 0, 0, 0, 0, 0]");
+    let sets = [&*signal, &*twist, "nodes.sum.in.sway='sway.twist'", &*alone, "devices.bench.for_s=40.0"];
+    let sets = sets.iter().chain(more).flat_map(|set| ["--set", set]);
+    let rows = recorded(&[&*graph, "--bench", &*bench].into_iter().chain(sets).collect::<Vec<_>>(), "32s");
+    let mut way = 0.0;
+    let moved = rows.iter().filter_map(|row| {
+        let velocity = row.get(&format!("sum.twist.v{place}")).copied().unwrap_or(0.0);
+        way += velocity * PERIOD;
+        Some((row["time"], velocity, way, *row.get(&format!("error.error.{place}"))?))
+    });
+    let moved: Vec<_> = moved.filter(|(time, ..)| *time > 11.0).collect();
+    let (least, most) = moved.iter().fold((f64::MAX, f64::MIN), |(a, b), (.., x)| (a.min(*x), b.max(*x)));
+    let middle = 0.5 * (least + most);
+    let crossings = moved.windows(2).filter(|pair| (pair[0].3 < middle) != (pair[1].3 < middle));
+    let (there, back): (Vec<_>, Vec<_>) = crossings.map(|pair| pair[1]).partition(|(_, velocity, ..)| *velocity > 0.0);
+    let mean = |rows: &[(f64, f64, f64, f64)]| rows.iter().map(|row| row.2).sum::<f64>() / rows.len() as f64;
+    (mean(&there) - mean(&back)).abs()
+}
+
+#[test]
+fn the_play_of_a_contact_is_the_width_of_its_hysteresis() {
+    let rests = ["nodes.guide.twist=[0, 0, 0, 0, 0, 0]"];
+    for (task, bench, place, amplitude, more) in [
+        ("hybrid", "ball", "x", 0.005, &[][..]),
+        ("hybrid", "ball", "y", 0.010, &[]),
+        ("hybrid", "pen", "y", 0.012, &[]),
+        ("cable", "cable", "x", 0.005, &rests),
+    ] {
+        let ran = hysteresis(task, bench, place, amplitude, more);
+        let explained = loop_of(task, bench, place);
+        let [play, step, late] = ["play", "step", "late_s"].map(|key| explained["play"][key].as_f64().unwrap());
+        assert!((play / ran - 1.0).abs() < 0.2, "{task}, {bench}, {place}: {ran} m, explained {play} m");
+        assert!((late - play * explained["margins"]["ramp_lag_s"].as_f64().unwrap() / step).abs() < 1e-12);
+    }
+}
+
 /// The approaches of a mode, by the node that makes them.
 fn approach(args: &[&str], mode: &str, node: &str) -> Value {
     let explained = explained(args);

@@ -160,11 +160,10 @@ fn what_cannot_be_tuned_says_why() {
             &["graphs/hand.toml"],
             "tactflow tune graphs/force.toml --bench graphs/benches/hand.toml --set bind.arm=palm --set bind.pad=palm",
         ),
-        (&["graphs/carry.toml"], "the part `left`, which has [inputs] and cannot run alone"),
-        (&["graphs/finger_press.toml"], "a graph without modes has no mode to tune"),
+        (&["graphs/finger_press.toml"], "`iscan` plays a recording, which does not answer the motion"),
+        (&["tests/errors/wrong_columns.toml"], "a graph without modes has no mode to tune"),
         (&["graphs/hybrid.toml", "--feature", "x", "--set", "nodes.pid.gains.x.kp=-3"], "of `x` is negative: make it"),
         (&["graphs/force.toml", "--peak", "0.9"], "it must be more than 1, as 1.7 is"),
-        (&["graphs/seek_ridge.toml"], "`x` is not measured: its modes can follow each other without a contact"),
     ] {
         let said = say(&[&["tune"], args].concat());
         assert_eq!(said.code, 2, "{}", said.err);
@@ -321,6 +320,45 @@ fn a_task_that_follows_a_cable_is_tuned_while_it_stands() {
         (&tuned["features"][0]["answers"][0]["fits"][0][1], tuned["features"][0]["new"][0].as_f64().unwrap());
     // By geometry, 1 rad of the sensor turns the line by 1 rad; the shipped gain is 6.
     assert!((1.0..1.4).contains(&-fit["gain"].as_f64().unwrap()) && (kp / 6.0 - 1.0).abs() < 0.2, "{kp}: {fit}");
+}
+
+#[test]
+#[ignore = "it takes more than a minute: `.ci/edge` runs it"]
+fn a_task_whose_modes_can_follow_each_other_without_a_contact_is_tuned_in_one_of_them() {
+    let said = say(&["tune", "graphs/seek_ridge.toml", "--feature", "orientation", "--format", "json"]);
+    assert_eq!(said.code, 0, "{}{}", said.out, said.err);
+    let tuned: Value = serde_json::from_str(&said.out).unwrap();
+    let (fit, kp) =
+        (&tuned["features"][0]["answers"][0]["fits"][0][1], tuned["features"][0]["new"][0].as_f64().unwrap());
+    // The shipped gain is 2, and that of the edge, which is as long and stiffer, is 7.
+    assert!((1.0..1.4).contains(&-fit["gain"].as_f64().unwrap()) && kp > 2.0 && kp < 10.0, "{kp}: {fit}");
+}
+
+#[test]
+#[ignore = "it takes some minutes: `.ci/edge` runs it"]
+fn two_arms_that_hold_an_object_are_tuned_together_and_their_part_gets_the_gains() {
+    let (folder, path) = in_new_folder("carry.toml");
+    let beside = |name: &str| folder.path().join(name).display().to_string();
+    let (side, bench) = (beside("carry_side.toml"), beside("box.toml"));
+    let parts = tactflow_tests::workspace().join("graphs/parts").display().to_string();
+    let whole = shipped("carry.toml").replace(&format!("{parts}/carry_side.toml"), &side);
+    let part = shipped("parts/carry_side.toml")
+        .replace("\"touch.toml\"", &format!("\"{parts}/touch.toml\""))
+        .replace("\"move.toml\"", &format!("\"{parts}/move.toml\""));
+    fs::write(&path, &whole).unwrap();
+    fs::write(&side, &part).unwrap();
+    fs::write(&bench, shipped("benches/carried_box.toml")).unwrap();
+    let said = say(&["tune", &path, "--bench", &bench, "--save"]);
+    assert_eq!(said.code, 0, "{}{}", said.out, said.err);
+    let read = |file: &str| toml::from_str::<toml::Table>(&fs::read_to_string(file).unwrap()).unwrap();
+    let gains = read(&side)["nodes"]["pid"]["gains"]["force"].clone();
+    let [kp, ki] = ["kp", "ki"].map(|key| gains[key].as_float().unwrap());
+    // The shipped gains are 1 and 0.5, and stay in their ratio.
+    assert!(kp > 1.0 && kp < 3.0 && (ki / kp - 0.5).abs() < 0.01, "{kp}, {ki}");
+    assert_eq!(fs::read_to_string(&path).unwrap(), whole);
+    let force = read(&bench)["facts"]["left_arm"]["contacts"][0]["force"].clone();
+    // One pad alone would move the object. Between both, the force grows with the way of each of them.
+    assert!((800.0..1200.0).contains(&force["vz"].as_float().unwrap()), "{force}");
 }
 
 #[test]

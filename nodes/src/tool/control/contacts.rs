@@ -45,6 +45,9 @@ pub(crate) struct Answer {
     /// Latency of this feature, instead of that of the contact [ms].
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(crate) latency_ms: Option<f64>,
+    /// How far the sensor moves after a turn until the feature of a contact that sticks follows [m] or [rad].
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(crate) play: Option<f64>,
     /// What was measured in place of resonance and latency: frequency [Hz], answer as a multiple of that to a slow motion
     /// [1], and its phase [deg].
     #[serde(skip_serializing_if = "Vec::is_empty")]
@@ -66,6 +69,11 @@ impl Answer {
             "orientation" | "angle" => Some(Self { wz: Some(-1.0), ..Self::default() }),
             _ => None,
         }
+    }
+
+    /// Returns whether it says how the feature follows in time: by a resonance, a latency or a response.
+    pub(crate) const fn states_dynamics(&self) -> bool {
+        self.resonance_hz.is_some() || self.latency_ms.is_some() || !self.response.is_empty()
     }
 
     /// Returns the change of the feature for each unit of a twist.
@@ -100,7 +108,11 @@ impl Answer {
         let positive = [("resonance_hz", self.resonance_hz), ("damping_ratio", self.damping_ratio)];
         let bad =
             positive.into_iter().find(|(_, value)| value.is_some_and(|value| !(value > 0.0 && value.is_finite())));
-        let late = self.latency_ms.filter(|latency| !(*latency >= 0.0 && latency.is_finite()));
+        let negative = |value: &f64| !(*value >= 0.0 && value.is_finite());
+        if let Some(play) = self.play.filter(negative) {
+            return Err(format!("`play` of `{feature}` is {play}: write 0 or more, in m or rad"));
+        }
+        let late = self.latency_ms.filter(negative);
         match (bad, late) {
             (Some((key, Some(value))), _) => {
                 Err(format!("`{key}` of `{feature}` is {value}: write a number greater than 0"))
@@ -150,10 +162,7 @@ impl Contact {
     /// response.
     pub(crate) fn is_by_geometry(&self, feature: &str) -> bool {
         let stated = self.features.get(feature);
-        let states_dynamics = |answer: &Answer| {
-            answer.resonance_hz.is_some() || answer.latency_ms.is_some() || !answer.response.is_empty()
-        };
-        !stated.is_some_and(states_dynamics) && Answer::of_geometry(feature).is_some()
+        !stated.is_some_and(Answer::states_dynamics) && Answer::of_geometry(feature).is_some()
     }
 
     /// Returns how a feature answers: as the bench says, or else by geometry.
@@ -235,6 +244,7 @@ mod tests {
             ),
             (r#"contacts = [{ object = "ball", x = { vx = -1.0, response = [[2.0, 1.0]] } }]"#, "length"),
             (r#"contacts = [{ object = "ball", latency_ms = -1.0 }]"#, "`latency_ms` is -1"),
+            (r#"contacts = [{ object = "ball", x = { vx = -1.0, play = -0.001 } }]"#, "`play` of `x` is -0.001"),
             (r#"contacts = [{ object = "ball", pressure = { vz = nan } }]"#, "no finite answer"),
         ] {
             let message = read(text).unwrap_err();

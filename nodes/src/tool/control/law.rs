@@ -4,9 +4,14 @@ use serde::Serialize;
 use tactflow_runtime::graph::OutlinedBlock;
 
 use super::contacts::Contact;
+use super::digits::to_three_digits;
 use super::filters::{Filter, smoothing, way};
 use super::nodes::{Nodes, source};
 use super::schedule::Schedule;
+
+/// A usual step of a place [m], which is more than most contacts stick, and of an angle [rad].
+const PLACE_STEP: f64 = 5e-3;
+const ANGLE_STEP: f64 = 0.05;
 
 /// What a twist is made of.
 #[derive(Debug, Default, Serialize)]
@@ -143,6 +148,19 @@ impl Feature {
             "x" | "y" => Some("m"),
             "orientation" | "angle" => Some("rad"),
             _ => None,
+        }
+    }
+
+    /// Returns a usual step of its setpoint [m] or [rad]; `None` for what is no place and no angle.
+    pub(crate) fn usual_step(&self) -> Option<f64> {
+        Some(if self.unit()? == "m" { PLACE_STEP } else { ANGLE_STEP })
+    }
+
+    /// Returns a length or an angle of this feature with its unit, of a place in mm.
+    pub(crate) fn in_units(&self, value: f64) -> String {
+        match self.unit() {
+            Some("m") => format!("{} mm", to_three_digits(1e3 * value)),
+            _ => format!("{} rad", to_three_digits(value)),
         }
     }
 

@@ -6,7 +6,7 @@ use std::path::Path;
 use tactflow_runtime::cli::table;
 
 use super::approaches::Approach;
-use super::stability::Stability;
+use super::stability::{Play, Stability};
 use super::{Explained, ModeLaw, Motion};
 use crate::motion::COMPONENTS;
 use crate::tool::control::digits::or_none;
@@ -208,6 +208,7 @@ fn loops(loops: &[Stability], style: &Style) -> String {
              the arm and are too large, and a contact that sticks follows later. `tactflow tune` measures it."
         );
     }
+    text += &loops.iter().filter_map(sticking).collect::<String>();
     let found = loops.iter().filter_map(|one| Some((one, one.margins.as_ref()?)));
     let worst = found.max_by(|(_, a), (_, b)| {
         (!a.is_stable, a.peak_sensitivity)
@@ -226,6 +227,17 @@ fn loops(loops: &[Stability], style: &Style) -> String {
         );
     }
     text
+}
+
+/// Says what the play of a contact does to a step.
+fn sticking(one: &Stability) -> Option<String> {
+    let Play { late_s, texts: [play, step], .. } = one.play.as_ref()?;
+    let late = number((1e2 * late_s).round() * 1e-2);
+    Some(format!(
+        "{} sticks: after a turn of the motion it follows once the sensor has moved by {play}.\n\
+         A step of {step} is answered up to {late} s later.\n",
+        place(one)
+    ))
 }
 
 /// Names a loop: its feature, and the object if the bench names one.

@@ -18,8 +18,36 @@ pub(super) struct Stability {
     /// Whether a schedule multiplies the gains by what this command does not know.
     #[serde(skip)]
     pub(super) is_unknown: bool,
+    /// How far the sensor moves after a turn until a contact that sticks follows.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(super) play: Option<Play>,
     /// `None` if nothing says how the feature answers.
     pub(super) margins: Option<Margins>,
+}
+
+/// What the play of a contact does to a step.
+#[derive(Debug, Serialize)]
+pub(super) struct Play {
+    /// The play [m] or [rad].
+    pub(super) play: f64,
+    /// The step [m] or [rad].
+    pub(super) step: f64,
+    /// How much later a step is answered than the margins say, at most [s].
+    pub(super) late_s: f64,
+    /// Both lengths with their unit.
+    #[serde(skip)]
+    pub(super) texts: [String; 2],
+}
+
+impl Play {
+    /// Returns the play of a feature over a contact. By the proportional gain, the sensor moves as fast as a step decays at
+    /// first.
+    fn of(feature: &Feature, contact: &Contact, margins: &Margins) -> Option<Self> {
+        let play = contact.features.get(feature.quantity()?)?.play.filter(|play| *play > 0.0)?;
+        let step = feature.usual_step()?;
+        let late_s = play * margins.ramp_lag_s / step;
+        Some(Self { play, step, late_s, texts: [play, step].map(|value| feature.in_units(value)) })
+    }
 }
 
 /// Returns the margins of all features that a law controls, with the contacts that the bench declares for the arm.
@@ -27,14 +55,16 @@ pub(super) fn stability(declared: &[Contact], law: &Law) -> Vec<Stability> {
     let alone = [Contact::by_geometry()];
     let declared = if declared.is_empty() { &alone[..] } else { declared };
     let controlled: Vec<&Feature> = law.features.iter().filter(|feature| feature.moves()).collect();
-    let loops = declared.iter().flat_map(|contact| {
-        controlled.iter().map(|feature| Stability {
+    let over = |contact: &Contact, feature: &Feature| {
+        let margins = Loop::over(feature, contact).map(|around| margins(&around));
+        Stability {
             object: contact.name().map(str::to_owned),
             feature: feature.name.clone(),
             by_geometry: feature.quantity().is_some_and(|quantity| contact.is_by_geometry(quantity)),
             is_unknown: feature.schedules.iter().any(|schedule| schedule.nominal.is_none()),
-            margins: Loop::over(feature, contact).map(|around| margins(&around)),
-        })
-    });
-    loops.collect()
+            play: margins.as_ref().and_then(|margins| Play::of(feature, contact, margins)),
+            margins,
+        }
+    };
+    declared.iter().flat_map(|contact| controlled.iter().map(move |feature| over(contact, feature))).collect()
 }

@@ -6,6 +6,7 @@ use super::Stop;
 use super::experiment::{Answered, Experiment};
 use super::fit::ENOUGH;
 use super::limited::Limited;
+use super::play::play;
 use super::spectrum::Line;
 
 /// Amplitudes of a linear [m] and of an angular test signal [rad], one after the other.
@@ -50,11 +51,13 @@ pub(super) enum Unknown {
 /// largest motions that agree. Friction hides a small motion, and gives two of them the same wrong response: no larger
 /// motion may have a larger one. If the last two only differ a little, the larger response counts, which has the smaller
 /// margins: a contact may stiffen when it is pressed further, and press less when it is nearly left.
+///
+/// Also returns the play of the contact.
 pub(super) fn agreed(
     experiment: &Experiment<'_>,
     component: usize,
     shell: &Shell,
-) -> Result<Result<Response, Refusal>, Stop> {
+) -> Result<(Result<Response, Refusal>, Option<f64>), Stop> {
     let (mut runs, mut limited): (Vec<Vec<Line>>, Vec<Option<Limited>>) = (Vec::new(), Vec::new());
     let (mut stopped, mut is_absent) = (None, false);
     let unit = if component < 3 { "m" } else { "rad" };
@@ -72,7 +75,7 @@ pub(super) fn agreed(
                 break;
             }
             Answered::NotReached(why) if runs.is_empty() => {
-                return Ok(Err(Refusal { why, kind: Unknown::NotReached }));
+                return Ok((Err(Refusal { why, kind: Unknown::NotReached }), None));
             }
             Answered::NotReached(why) => {
                 stopped = Some(why);
@@ -81,11 +84,12 @@ pub(super) fn agreed(
             Answered::Interrupted => return Err(Stop::Interrupted),
         }
     }
+    let play = play(experiment.feature, component, runs.iter().flatten());
     // A light contact is not linear where a motion nearly lifts the pad off.
     let lifts_off = stopped.as_ref().map(|_| amplitudes[runs.len()]).filter(|_| component == PRESSES && is_absent);
     if let Some((lines, growth, last)) = largest(&runs) {
         let lifts_off = lifts_off.filter(|_| growth.is_some());
-        return Ok(Ok(Response { lines, growth, limited: limited[last].take(), lifts_off }));
+        return Ok((Ok(Response { lines, growth, limited: limited[last].take(), lifts_off }), play));
     }
     let agree = (1..runs.len()).any(|i| difference(&runs[i - 1], &runs[i]) < AGREES);
     let kind = if !agree && stopped.is_some() { Unknown::Lost } else { Unknown::Hidden };
@@ -98,7 +102,7 @@ pub(super) fn agreed(
             )
         }),
     };
-    Ok(Err(Refusal { why, kind }))
+    Ok((Err(Refusal { why, kind }), play))
 }
 
 /// Returns the response to the largest motions that agree, or to one of the last two if they differ a little: then with

@@ -5,6 +5,7 @@ use std::path::PathBuf;
 use tactflow_runtime::cli::Shell;
 use tactflow_runtime::graph::{Outline, Request, compile};
 
+use super::task::Task;
 use super::{TuneArgs, signal};
 use crate::tool::control::contacts::{Contact, contacts};
 use crate::tool::control::nodes::commands;
@@ -37,7 +38,7 @@ impl Case {
 }
 
 /// Returns what is measured: each bench as it is, and with each of the settings. Simulated devices run long enough.
-pub(super) fn cases(args: &TuneArgs, request: &Request, shell: &Shell) -> Result<Vec<Case>, String> {
+pub(super) fn cases(args: &TuneArgs, request: &Request, task: &Task, shell: &Shell) -> Result<Vec<Case>, String> {
     let benches = [None].into_iter().chain(args.others.iter().map(Some));
     let settings = || [None].into_iter().chain(args.also.iter().map(Some));
     let each = benches.flat_map(|bench| settings().map(move |also| (bench, also)));
@@ -45,7 +46,8 @@ pub(super) fn cases(args: &TuneArgs, request: &Request, shell: &Shell) -> Result
         let mut request = Request { bench: bench.cloned().or_else(|| request.bench.clone()), ..request.clone() };
         request.set.extend(also.cloned());
         let compiled = compile(shell.catalogue(), &request).map_err(|report| report.render(false))?;
-        let outline = compiled.outline();
+        answers(compiled.outline())?;
+        let outline = &task.outline(compiled.outline());
         request.set.extend(signal::long_enough(outline, signal::duration(outline.period_s)));
         let arm = arm_of(outline).unwrap_or_default();
         let stated = Stated { file: bench_file(outline), contacts: contacts(compiled.facts(), arm)? };
@@ -58,6 +60,17 @@ pub(super) fn cases(args: &TuneArgs, request: &Request, shell: &Shell) -> Result
         Ok(Case { request, outline, stated, object: object.unwrap_or_else(|| "object".into()) + &with })
     })
     .collect()
+}
+
+/// Refuses a bench that does not answer the motion of the arm.
+pub(super) fn answers(outline: &Outline) -> Result<(), String> {
+    let recording = outline.devices.iter().find(|device| device.kind.text == "recording");
+    recording.map_or(Ok(()), |device| {
+        let name = &device.name;
+        Err(format!(
+            "`{name}` plays a recording, which does not answer the motion: name a simulated or a real bench with `--bench`"
+        ))
+    })
 }
 
 /// Returns the file of the bench that a request uses, as the places of its devices say.

@@ -31,7 +31,7 @@ fn table(contact: &Contact) -> Table {
 }
 
 fn of_feature(answer: &Answer) -> Table {
-    let Answer { vx, vy, vz, wx, wy, wz, resonance_hz, damping_ratio, latency_ms, ref response } = *answer;
+    let Answer { vx, vy, vz, wx, wy, wz, resonance_hz, damping_ratio, latency_ms, play, ref response } = *answer;
     let keys = [
         ("vx", vx),
         ("vy", vy),
@@ -42,6 +42,7 @@ fn of_feature(answer: &Answer) -> Table {
         ("resonance_hz", resonance_hz),
         ("damping_ratio", damping_ratio),
         ("latency_ms", latency_ms),
+        ("play", play),
     ];
     let mut table = Table::new();
     for (key, value) in keys.into_iter().filter_map(|(key, value)| Some((key, value?))) {
@@ -76,7 +77,7 @@ mod tests {
     #[test]
     fn a_contact_is_read_as_it_was_written() {
         let response = (1..=11).map(|i| [0.5 * f64::from(i), 1.0 + 0.25 * f64::from(i), -7.0 * f64::from(i)]).collect();
-        let answer = Answer { vz: Some(7.0), latency_ms: Some(0.0), response, ..Answer::default() };
+        let answer = Answer { vz: Some(7.0), latency_ms: Some(0.0), play: Some(0.002), response, ..Answer::default() };
         let contact =
             Contact { object: "pen".into(), latency_ms: 4.0, features: [("pressure".to_owned(), answer)].into() };
         let text = lines("arm", std::slice::from_ref(&contact));

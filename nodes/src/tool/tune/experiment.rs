@@ -1,10 +1,10 @@
 //! One run with a test signal: the frequency response of a loop, measured while it is closed.
 
+use nalgebra::Complex;
 use tactflow_runtime::catalogue::Catalogue;
 use tactflow_runtime::engine::{End, Engine, RunOptions, run};
 use tactflow_runtime::graph::{Outline, OutlinedMode, Request, compile};
 use tactflow_runtime::record::PortColumns;
-use tactflow_runtime::source::{Code, Report};
 
 use super::gain_keys::gains;
 use super::lift;
@@ -12,8 +12,11 @@ use super::limited::{Limited, Watch};
 use super::signal::{Pace, Sine, duration, measured, settling};
 use super::spectrum::{Line, line};
 use super::stay::Stay;
+use super::task::Task;
 use crate::motion::COMPONENTS;
+use crate::tool::control::contacts::Answer;
 use crate::tool::control::law::Feature;
+use crate::tool::control::response::Loop;
 
 /// Beginning of the names of the nodes that make the test signal.
 const SIGNAL: &str = "tune";
@@ -21,6 +24,7 @@ const SIGNAL: &str = "tune";
 /// The loop that an experiment opens with its signal.
 pub(super) struct Experiment<'a> {
     pub(super) catalogue: &'a Catalogue,
+    pub(super) task: &'a Task,
     pub(super) request: &'a Request,
     pub(super) outline: &'a Outline,
     pub(super) mode: &'a OutlinedMode,
@@ -37,6 +41,13 @@ pub(super) struct Experiment<'a> {
 
 /// Share of the gains for which the response holds, and with which a loop is measured first [1].
 pub(super) const HALF: f64 = 0.5;
+
+/// Returns the response of what the graph states, at half of the gains and for one component alone.
+pub(super) fn known(feature: &Feature, component: usize) -> impl Fn(f64) -> Complex<f64> {
+    let around = Loop::new(feature, &Answer::default(), 0.0).times(HALF);
+    let column = feature.column[component];
+    move |omega| around.known(omega) * column
+}
 
 /// What one run said.
 #[derive(Debug)]
@@ -58,16 +69,18 @@ impl Experiment<'_> {
     /// If the graph with the signal does not load.
     pub(super) fn run(&self, component: usize, amplitude: f64) -> Result<Answered, String> {
         let settings = self.settings(component, amplitude);
-        lift::unless_it_bounces(self.request, &settings, self.mode, |request| self.attempt(component, request))
+        lift::unless_it_bounces((self.task, self.request), &settings, self.mode, |request| {
+            self.attempt(component, request)
+        })
     }
 
     /// Runs with a signal along a component. Also returns whether the pad has bounced at the first touch.
     fn attempt(&self, component: usize, request: &Request) -> Result<(Answered, bool), String> {
-        let compiled = compile(self.catalogue, request).map_err(|report| self.refused(&report))?;
+        let compiled = compile(self.catalogue, request).map_err(|report| report.render(false))?;
         let mut engine = Engine::new(compiled);
         let pid = self.feature.pid.as_deref().unwrap_or_default();
         let find = |engine: &Engine, name: String| {
-            PortColumns::find(engine.ports(), &name).ok_or_else(|| format!("no port is `{name}`"))
+            PortColumns::find(engine.ports(), &self.task.port(&name)).ok_or_else(|| format!("no port is `{name}`"))
         };
         let control = find(&engine, format!("{pid}.control.{}", self.feature.name))?;
         let all = find(&engine, format!("{}.twist.{}", self.adder, COMPONENTS[component]))?;
@@ -79,7 +92,7 @@ impl Experiment<'_> {
         let column = self.feature.column[component];
         let outcome = run(&mut engine, &options, &mut |engine| {
             let read = |port| engine.bus().scalar(port).unwrap_or(f64::NAN);
-            stay.see(engine.mode(), || [read(control) * column, read(all)]);
+            stay.see(self.task.mode(engine), || [read(control) * column, read(all)]);
             if (settled..wanted).contains(&stay.rows().len()) {
                 limits.see(engine);
             }
@@ -104,18 +117,6 @@ impl Experiment<'_> {
             _ => Answered::Lines(sines.iter().map(|sine| self.line(rows, sine)).collect(), limits.most()),
         };
         Ok((answered, stay.has_bounced()))
-    }
-
-    /// Returns why the graph with the signal does not load.
-    fn refused(&self, report: &Report) -> String {
-        if !report.diagnostics.iter().any(|one| one.code == Code::UngatedMotion) {
-            return report.render(false);
-        }
-        format!(
-            "`{}` is not measured: its modes can follow each other without a contact, so nothing would end the test \
-             signal. Tune it in a task that holds it in one mode",
-            self.feature.name
-        )
     }
 
     /// Returns the response to a sine, with half of the gains: the controller is linear.

@@ -1,20 +1,18 @@
 //! How a feature answers the motion over one contact.
 
-use nalgebra::Complex;
 use serde::Serialize;
 use tactflow_runtime::cli::Shell;
 
 use super::Stop;
 use super::amplitudes::{Response, Unknown, agreed};
-use super::experiment::{Experiment, HALF};
+use super::experiment::{Experiment, known};
 use super::fit::{ENOUGH, Fit, fit};
 use super::limited::Limited;
 use super::spectrum::Line;
 use crate::motion::COMPONENTS;
 use crate::tool::control::contacts::Answer;
-use crate::tool::control::digits::to_three_digits;
+use crate::tool::control::digits::{to_three_digits, to_two_digits};
 use crate::tool::control::law::Feature;
-use crate::tool::control::response::Loop;
 
 /// The answer of a feature over one contact.
 #[derive(Debug, Serialize)]
@@ -31,6 +29,9 @@ pub(super) struct Identified {
     /// The limit that acted much while it was measured.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(super) limited: Option<Limited>,
+    /// How far the sensor moves after a turn until the feature follows [m] or [rad]; `None` if it follows at once.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(super) play: Option<f64>,
     /// Amplitude of the motion that lifts the pad off, if no two smaller ones agree [m].
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(super) lifts_off: Option<f64>,
@@ -58,12 +59,14 @@ pub(super) fn identify(experiment: &Experiment<'_>, object: &str, shell: &Shell)
         lines: Vec::new(),
         growth: None,
         limited: None,
+        play: None,
         lifts_off: None,
         refused: None,
         unknown: None,
     };
     for component in (0..6).filter(|i| feature.column[*i] != 0.0) {
-        let response = agreed(experiment, component, shell)?;
+        let (response, play) = agreed(experiment, component, shell)?;
+        found.play = found.play.or_else(|| play.map(|play| to_two_digits(play, libm::round)));
         let unknown = response.as_ref().err().map_or(Unknown::Hidden, |refusal| refusal.kind);
         let fitted = response
             .map_err(|refusal| refusal.why)
@@ -118,20 +121,16 @@ fn sticks(quantity: &str, component: usize, fit: &Fit) -> bool {
     slides != 0.0 && fit.gain / slides < LEAST_SLIDE
 }
 
-/// Returns the response of what the graph states, at half of the gains and for one component alone.
-fn known(feature: &Feature, component: usize) -> impl Fn(f64) -> Complex<f64> {
-    let around = Loop::new(feature, &Answer::default(), 0.0).times(HALF);
-    let column = feature.column[component];
-    move |omega| around.known(omega) * column
-}
-
 /// Returns the answer of a feature to all components. The resonance and the latency are those of the first one, and the
 /// measured response is that of one which is alone.
 ///
 /// A contact that sticks follows a small motion only in part. It can slide at any time, so what geometry says counts if
-/// it is more.
+/// it is more, or if the response is not known.
 pub(super) fn answer(feature: &Feature, found: &Identified) -> Answer {
     let geometry = Answer::of_geometry(&quantity(feature)).unwrap_or_default().row();
+    if found.refused.is_some() {
+        return Answer { play: found.play, ..Answer::of_geometry(&quantity(feature)).unwrap_or_default() };
+    }
     let mut answer = Answer::default();
     for (component, fit) in &found.fits {
         let entry = match *component {
@@ -145,6 +144,7 @@ pub(super) fn answer(feature: &Feature, found: &Identified) -> Answer {
         let slides = geometry[index(component)];
         *entry = Some(if slides.abs() > fit.gain.abs() { slides } else { to_three_digits(fit.gain) });
     }
+    answer.play = found.play;
     let Some((_, main)) = found.fits.first() else { return answer };
     if let ([(component, fit)], [lines]) = (&found.fits[..], &found.lines[..]) {
         answer.response = fit.response(lines, known(feature, index(component)));

@@ -4,6 +4,7 @@ use std::collections::BTreeSet;
 
 use tactflow_runtime::graph::{Outline, OutlinedMode, Request};
 
+use super::task::Task;
 use crate::tool::control::exits::{Exit, exits};
 
 /// The mode in which the sensor lifts off.
@@ -34,16 +35,12 @@ impl Lost {
 /// Runs a request with these settings too, with a lift after a contact that is lost. `run` also says whether the pad has
 /// bounced at the first touch: the task then finds the contact again, so it runs once more as the task says.
 pub(super) fn unless_it_bounces<T, E>(
-    request: &Request,
+    (task, request): (&Task, &Request),
     settings: &[String],
     mode: &OutlinedMode,
     run: impl Fn(&Request) -> Result<(T, bool), E>,
 ) -> Result<T, E> {
-    let with = |lost: Lost| {
-        let settings = settings.iter().cloned().chain(lost.setting(mode, &mode.name));
-        let set = request.set.iter().cloned().chain(settings).collect();
-        run(&Request { set, ..request.clone() })
-    };
+    let with = |lost: Lost| run(&task.with(request, settings.iter().cloned().chain(lost.setting(mode, &mode.name))));
     match with(Lost::Lifts)? {
         (_, true) => with(Lost::AsTheTaskSays).map(|(seen, _)| seen),
         (seen, false) => Ok(seen),
@@ -58,8 +55,8 @@ pub(super) fn left(mode: &str, to: &str) -> String {
     }
 }
 
-/// Returns the settings that let a mode end after so long [s], whatever its exits `go` say, and lift the sensor off.
-/// The exit `fail` stays. A lost contact leads where [`Lost`] says.
+/// Returns the settings that let a mode end after so long [s], whatever its exits `go` say, and lift the sensor off. An
+/// exit `done` that only waits for a time is off too. The exit `fail` stays. A lost contact leads where [`Lost`] says.
 pub(super) fn settings(outline: &Outline, mode: &OutlinedMode, adder: &str, after_s: f64) -> Vec<String> {
     let mut set = vec![
         go(mode, MODE, after_s),
@@ -67,6 +64,9 @@ pub(super) fn settings(outline: &Outline, mode: &OutlinedMode, adder: &str, afte
         format!("nodes.{MODE}_twist.twist=[0, 0, 0, 0, 0, 0]"),
         format!("nodes.{adder}.in.{MODE}={MODE}_twist.twist"),
     ];
+    if exits(mode, "done").any(|exit| exit.waits() > 0.0) {
+        set.push(format!("modes.{}.done=[{{ on = \"{MODE}\" }}]", mode.name));
+    }
     for lift in [Some(MODE), can_lose(mode).then_some(LOST)].into_iter().flatten() {
         let projectors = outline.nodes.iter().filter(|node| node.kind.text == "projector");
         set.extend(projectors.map(|node| format!("modes.{lift}.set.{}.select=[0, 0, 0, 0, 0, 0]", node.name)));

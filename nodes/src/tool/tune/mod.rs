@@ -13,6 +13,7 @@ mod identify;
 mod lift;
 mod limited;
 mod page;
+mod play;
 mod propose;
 mod ranges;
 mod save;
@@ -23,6 +24,7 @@ mod stay;
 mod step;
 mod still;
 mod target;
+mod task;
 mod trial;
 mod tuned;
 
@@ -31,7 +33,7 @@ use std::path::{Path, PathBuf};
 use tactflow_runtime::cli::clap::{self, ValueEnum};
 use tactflow_runtime::cli::{GraphArgs, Shell};
 use tactflow_runtime::engine::Engine;
-use tactflow_runtime::graph::{Outline, Request, compile};
+use tactflow_runtime::graph::{Compiled, Request, compile};
 
 use super::arguments::{may_draw, write};
 use super::control::chain::{chain, smallest};
@@ -133,23 +135,19 @@ pub(super) fn run(args: TuneArgs, shell: &Shell) -> Result<u8, u8> {
     let compiled = compile(shell.catalogue(), &request).map_err(|report| shell.reject(&report))?;
     compiled.warnings().iter().for_each(|report| shell.show(report));
     let outline = compiled.outline().clone();
-    let ranges = Range::all(&Engine::new(compiled));
-    let opened = ranges.iter().flat_map(Range::opened);
-    let request = Request { set: request.set.iter().cloned().chain(opened).collect(), ..request };
-    let tuned = match tune(&args, shell, &request, &outline) {
+    let tuned = match tune(&args, shell, &request, compiled) {
         Ok(tuned) => tuned,
         Err(Stop::Interrupted) => return Ok(130),
         Err(Stop::Refused(message)) => return Err(shell.refuse(message)),
     };
-    let ranges = ranges.iter().filter_map(|range| range.beyond(&tuned.features)).collect();
-    let tuned = Tuned { ranges, ..tuned };
+    let outline = tuned.task.outline(&outline);
     let is_whole =
         tuned.features.iter().all(|feature| feature.new.is_some()) && tuned.settled.iter().all(Settled::is_good);
     match args.format {
         Format::Json => shell.say_json(&tuned),
         // What is saved is shown when it is written.
         Format::Text if args.save && is_whole => shell.say(page::text(&tuned).trim_end()),
-        Format::Text => shell.say((page::text(&tuned) + &page::lines(&tuned)).trim_end()),
+        Format::Text => shell.say((page::text(&tuned) + &page::lines(&tuned, &outline)).trim_end()),
     }
     if args.save && is_whole {
         let written = save::save(&args, &outline, &tuned, shell).map_err(|message| shell.refuse(message))?;
@@ -178,20 +176,29 @@ fn writable(path: &Path) -> Result<(), String> {
 }
 
 /// Measures the features of one mode, proposes gains, and tries them.
-fn tune(args: &TuneArgs, shell: &Shell, request: &Request, outline: &Outline) -> Result<Tuned, Stop> {
-    let command = commands(outline).next().ok_or("no role is an arm, so nothing moves".to_owned())?;
+fn tune(args: &TuneArgs, shell: &Shell, request: &Request, compiled: Compiled) -> Result<Tuned, Stop> {
+    let whole = compiled.outline().clone();
+    cases::answers(&whole)?;
+    let command = commands(&whole).next().ok_or("no role is an arm, so nothing moves".to_owned())?;
+    let index = Index::new(&whole);
+    let (_, twist) = chain(&Nodes::new(&index, None), command.port)?;
+    let task = target::task(&index, &twist, command.arm)?;
+    let ranges = Range::all(&Engine::new(compiled), &task);
+    let request = task.with(request, ranges.iter().flat_map(Range::opened));
+    let outline = &task.outline(&whole);
+    let command = commands(outline).next().ok_or("nothing moves the arm".to_owned())?;
     let index = Index::new(outline);
     let (limits, twist) = chain(&Nodes::new(&index, None), command.port)?;
-    let (mode, controlled) = controlled(args, &index, &twist, command.arm)?;
+    let (mode, controlled) = controlled(args, &index, &twist)?;
     let adder = adder(&index, &twist)?;
     let nodes = Nodes::new(&index, Some(mode));
     let (resting, still) = still::settings(&nodes, mode, &law(&nodes, &twist));
     resting.iter().for_each(|node| shell.say_beside(&format!("`{node}` rests meanwhile")));
-    let request = &Request { set: [&request.set[..], &still].concat(), ..request.clone() };
+    let request = task.with(&request, still);
     let wanted = Wanted { peak: args.peak, gain_db: args.gain_margin, phase_deg: args.phase_margin };
-    let cases: Vec<Case> = cases(args, request, shell)?;
+    let cases: Vec<Case> = cases(args, &request, &task, shell)?;
     let pace = Pace::all(|key| smallest(&nodes, &limits, key));
-    let measurement = Measurement { shell, outline, mode, adder: &adder, cases: &cases, pace, wanted };
+    let measurement = Measurement { shell, task: &task, outline, mode, adder: &adder, cases: &cases, pace, wanted };
     let mut contacts: Vec<Contact> = cases.iter().map(Case::contact).collect();
     let mut features = Vec::new();
     for feature in &controlled {
@@ -201,10 +208,11 @@ fn tune(args: &TuneArgs, shell: &Shell, request: &Request, outline: &Outline) ->
     }
     let arm = command.arm.to_owned();
     let benches = cases.iter().map(|case| case.stated.clone()).collect();
-    let (name, ranges, settled) = (mode.name.clone(), Vec::new(), Vec::new());
-    let mut tuned = Tuned { mode: name, resting, arm, wanted, contacts, benches, features, ranges, settled };
+    let ranges = ranges.iter().filter_map(|range| range.beyond(&features)).collect();
+    let (name, settled) = (mode.name.clone(), Vec::new());
+    let mut tuned = Tuned { task, mode: name, resting, arm, wanted, contacts, benches, features, ranges, settled };
     for case in &cases {
-        let trial = Trial::new(shell.catalogue(), case, mode, &adder);
+        let trial = Trial::new(shell.catalogue(), &tuned.task, case, (mode, &adder));
         tuned.settled.extend(compare(&trial, &tuned.features, &case.object)?);
     }
     Ok(tuned)

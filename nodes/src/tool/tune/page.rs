@@ -4,6 +4,7 @@ use std::fmt::Write;
 use std::path::Path;
 
 use tactflow_runtime::cli::table;
+use tactflow_runtime::graph::Outline;
 
 use super::amplitudes::Unknown;
 use super::cases::Stated;
@@ -16,6 +17,7 @@ use super::settled::Held;
 use super::step::{self, Step};
 use super::tuned::Tuned;
 use crate::tool::control::digits::{or_none, to_three_digits};
+use crate::tool::control::law::Feature;
 
 /// Columns of the table of answers.
 const ANSWERS: [&str; 7] = ["contact", "motion", "per m or rad", "resonance", "damping", "latency", "frequencies"];
@@ -33,7 +35,7 @@ pub(super) fn text(tuned: &Tuned) -> String {
     }
     for feature in &tuned.features {
         let _ = write!(text, "`{}` in the mode `{}`\n\n", feature.name, tuned.mode);
-        text += &answers(&feature.answers);
+        text += &answers(&feature.feature, &feature.answers);
         text += &climbed(feature);
         text += &gains(feature);
         text.push('\n');
@@ -42,7 +44,7 @@ pub(super) fn text(tuned: &Tuned) -> String {
     text
 }
 
-fn answers(found: &[Identified]) -> String {
+fn answers(feature: &Feature, found: &[Identified]) -> String {
     let rows = found.iter().flat_map(|one| {
         one.fits.iter().map(|(component, fit)| {
             let (hz, damping) = fit.resonance.unzip();
@@ -75,6 +77,11 @@ fn answers(found: &[Identified]) -> String {
             "Over `{object}`, `{limit}` reduced the motion in {share:.0} % of the ticks, so that the contact answers more than \
              measured: raise the limit, or keep smaller gains."
         );
+    }
+    for (object, play) in found.iter().filter_map(|one| Some((&one.object, one.play?))) {
+        let play = feature.in_units(play);
+        let _ =
+            writeln!(text, "Over `{object}`, it sticks: after a turn it follows once the sensor has moved by {play}.");
     }
     for (object, lifts_off) in found.iter().filter_map(|one| Some((&one.object, one.lifts_off?))) {
         let _ = writeln!(
@@ -228,16 +235,20 @@ fn followed(step: &Step) -> String {
 }
 
 /// The lines for the files.
-pub(super) fn lines(tuned: &Tuned) -> String {
-    let mut text = String::new();
-    for feature in &tuned.features {
-        let (Some([kp, ki, kd]), Some(pid)) = (feature.new, &feature.feature.pid) else { continue };
-        let _ = writeln!(text, "\n[nodes.{pid}]");
-        let gains = [("kp", kp), ("ki", ki), ("kd", kd)].into_iter().filter(|(_, gain)| *gain != 0.0);
-        for (key, gain) in gains {
-            let _ = writeln!(text, "gains.{}.{key} = {gain:?}", feature.name);
+pub(super) fn lines(tuned: &Tuned, outline: &Outline) -> String {
+    let mut sections: Vec<(String, String)> = Vec::new();
+    for (key, gain) in tuned.gains(outline) {
+        // Such as `nodes.pid`.
+        let end = key.match_indices('.').nth(1).map_or(key.len(), |(end, _)| end);
+        let (section, key) = (&key[..end], key[end..].trim_start_matches('.'));
+        if sections.last().is_none_or(|(last, _)| last != section) {
+            sections.push((section.to_owned(), String::new()));
         }
+        sections.last_mut().into_iter().for_each(|(_, lines)| *lines += &format!("{key} = {gain:?}\n"));
     }
+    let file = tuned.task.file().map_or_else(String::new, |file| format!("# in {}\n", name(Some(file))));
+    let gains: Vec<String> = sections.iter().map(|(section, lines)| format!("[{section}]\n{lines}")).collect();
+    let mut text = if gains.is_empty() { String::new() } else { format!("\n{file}{}", gains.join("\n")) };
     if !tuned.ranges.is_empty() {
         text += "\n[live]                              # in place of the old ranges\n";
     }
@@ -245,9 +256,14 @@ pub(super) fn lines(tuned: &Tuned) -> String {
         let _ = writeln!(text, "{} = {}", range.name, range.value());
     }
     for Stated { file, contacts } in tuned.stated() {
-        let file = file.as_deref().and_then(Path::file_name).map(|name| name.to_string_lossy().into_owned());
-        let file = file.unwrap_or_else(|| "the bench".into());
+        let file = name(file.as_deref());
         let _ = write!(text, "\n# in {file}\n{}", contact_tables::lines(&tuned.arm, &contacts));
     }
     text
+}
+
+/// Returns the name of a file; that of a bench which has none.
+fn name(file: Option<&Path>) -> String {
+    let name = file.and_then(Path::file_name).map(|name| name.to_string_lossy().into_owned());
+    name.unwrap_or_else(|| "the bench".into())
 }

@@ -14,6 +14,7 @@ use super::experiment::{Experiment, HALF};
 use super::identify::{Identified, answer, identify, quantity};
 use super::signal::Pace;
 use super::step::{Planned, STEPS};
+use super::task::Task;
 use super::trial::{Run, Trial};
 use crate::tool::control::choose::{Wanted, bound, factor};
 use crate::tool::control::contacts::Contact;
@@ -122,6 +123,7 @@ const QUARTER: f64 = 0.25;
 /// What is measured for each feature.
 pub(super) struct Measurement<'a> {
     pub(super) shell: &'a Shell,
+    pub(super) task: &'a Task,
     pub(super) outline: &'a Outline,
     pub(super) mode: &'a OutlinedMode,
     /// The node that adds the test signal to the motion.
@@ -182,7 +184,7 @@ impl Measurement<'_> {
     /// Compares gains of a feature by steps of its setpoint over all contacts, and proposes the best ones. A setpoint that
     /// cannot step gives none.
     fn climbed(&self, mut found: TunedFeature) -> Result<TunedFeature, Stop> {
-        let trial = |case| Trial::new(self.shell.catalogue(), case, self.mode, self.adder);
+        let trial = |case| Trial::new(self.shell.catalogue(), self.task, case, (self.mode, self.adder));
         let trials: Vec<Trial<'_>> = self.cases.iter().map(trial).collect();
         let steps: Option<Vec<[Planned; STEPS]>> = trials.iter().map(|trial| trial.steps(&found.feature)).collect();
         let Some(steps) = steps else {
@@ -213,15 +215,16 @@ impl Measurement<'_> {
         share: f64,
         part: f64,
     ) -> Result<(TunedFeature, Vec<Contact>), Stop> {
-        let Self { outline, mode, adder, .. } = *self;
+        let Self { task, outline, mode, adder, .. } = *self;
         let pace = self.pace.map(|pace| pace.times(part));
         let (catalogue, period) = (self.shell.catalogue(), outline.period_s);
         let mut contacts = contacts.to_vec();
         let found = self.cases.iter().zip(&mut contacts).map(|(case, contact)| {
             let request = &case.request;
-            let experiment = Experiment { catalogue, request, outline, mode, adder, feature, pace, period, share };
+            let experiment =
+                Experiment { catalogue, task, request, outline, mode, adder, feature, pace, period, share };
             let found = identify(&experiment, &case.object, self.shell)?;
-            if found.refused.is_none() {
+            if found.refused.is_none() || found.play.is_some() {
                 contact.features.insert(quantity(feature), answer(feature, &found));
             }
             Ok(found)

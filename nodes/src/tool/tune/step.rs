@@ -16,11 +16,9 @@ const LASTS_S: f64 = 5.0;
 pub(super) const STEPS: usize = 8;
 /// Beginning of the names of the modes with a changed setpoint.
 const MODE: &str = "tune_step";
-/// Step of a place [m], which is more than most contacts stick, and its largest share of the pad [1]; that of an angle
-/// [rad]; that of another feature as a share of its setpoint [1].
-const PLACE: f64 = 5e-3;
+/// Largest step of a place as a share of the pad, and the step of what is no place and no angle as a share of its setpoint
+/// [1].
 const PLACE_SHARE: f64 = 0.1;
-const ANGLE: f64 = 0.05;
 const SHARE: f64 = 0.2;
 /// Time over which the response is averaged [s], so that noise makes no overshoot.
 const MEAN_S: f64 = 0.04;
@@ -121,9 +119,10 @@ pub(super) fn plan(outline: &Outline, mode: &OutlinedMode, features: &[&Feature]
         let compared = feature.compared.as_deref().filter(|_| !reads_mode)?;
         let setpoint = setpoint(&nodes, compared, &feature.name)?;
         feature.quantity()?;
-        let (size, may_be_less) = match feature.unit() {
-            Some("m") => (extent(&nodes, feature).map_or(PLACE, |extent| PLACE.min(PLACE_SHARE * extent)), true),
-            Some(_) => (ANGLE, true),
+        let is_place = feature.unit() == Some("m");
+        let most = extent(&nodes, feature).filter(|_| is_place).map_or(f64::INFINITY, |extent| PLACE_SHARE * extent);
+        let (size, may_be_less) = match feature.usual_step() {
+            Some(step) => (step.min(most), true),
             None => (SHARE * setpoint, false),
         };
         (size != 0.0).then_some(Planned { setpoint, size, may_be_less })

@@ -1,8 +1,9 @@
 //! What is tuned: the features of one mode, and the node that takes the test signal.
 
-use tactflow_runtime::graph::{Outline, OutlinedBlock, OutlinedMode};
+use tactflow_runtime::graph::{OutlinedBlock, OutlinedMode};
 
 use super::TuneArgs;
+use super::task::Task;
 use crate::tool::control::collect::law;
 use crate::tool::control::law::Feature;
 use crate::tool::control::nodes::{Index, Nodes};
@@ -13,19 +14,14 @@ pub(super) fn controlled<'o>(
     args: &TuneArgs,
     index: &Index<'o>,
     twist: &str,
-    arm: &str,
 ) -> Result<(&'o OutlinedMode, Vec<Feature>), String> {
-    let task = index.task_of(twist);
-    if !task.is_empty() {
-        return Err(part(index.outline(), task, arm));
-    }
     let controlled = |mode: &OutlinedMode| {
         let law = law(&Nodes::new(index, Some(mode)), twist);
         law.features.into_iter().filter(Feature::moves).collect::<Vec<_>>()
     };
     let moving =
         |mode: &OutlinedMode| controlled(mode).into_iter().filter(|feature| feature.kp > 0.0).collect::<Vec<_>>();
-    let modes: Vec<&OutlinedMode> = index.modes(task).into_iter().flatten().collect();
+    let modes: Vec<&OutlinedMode> = index.modes("").into_iter().flatten().collect();
     let mode = match &args.mode {
         Some(name) => modes.iter().find(|mode| mode.name == *name).ok_or_else(|| {
             let names: Vec<String> = modes.iter().map(|mode| format!("`{}`", mode.name)).collect();
@@ -56,24 +52,31 @@ pub(super) fn controlled<'o>(
     Ok((*mode, features))
 }
 
-/// Returns what to tune instead of a part that moves an arm.
-fn part(outline: &Outline, task: &str, arm: &str) -> String {
+/// Returns the task that makes a twist: the graph itself, or a part of it with [inputs].
+///
+/// # Errors
+/// If it is a part that can run alone: says how to tune that.
+pub(super) fn task(index: &Index<'_>, twist: &str, arm: &str) -> Result<Task, String> {
+    let (task, outline) = (index.task_of(twist), index.outline());
+    if task.is_empty() {
+        return Ok(Task::default());
+    }
     let own = |node: &&OutlinedBlock| node.name.rsplit_once('.').is_some_and(|(part, _)| part == task);
     let file = outline.nodes.iter().find(own).map_or("", |node| &node.place.file);
     let table = |file: &str| std::fs::read_to_string(file).ok()?.parse::<toml::Table>().ok();
     let table = table(file).unwrap_or_default();
-    let says = format!("the arm follows the part `{task}`");
     if table.contains_key("inputs") {
-        return format!("{says}, which has [inputs] and cannot run alone: tune a task that has the same loop");
+        return Ok(Task::part(task, file.into()));
     }
+    let says = format!("the arm follows the part `{task}`");
     let device = outline.roles.iter().find(|role| role.name == arm).map_or("", |role| &role.device.text);
     let roles = table.get("roles").and_then(toml::Value::as_table).into_iter().flat_map(toml::Table::keys);
     let binds: String = roles.map(|role| format!(" --set bind.{role}={device}")).collect();
     let bench = outline.devices.first().map_or("", |device| &device.place.file);
-    format!(
+    Err(format!(
         "{says}: tune its file on the same bench. It has limits of its own; add those of this graph with --set\n\ntactflow \
          tune {file} --bench {bench}{binds}"
-    )
+    ))
 }
 
 /// Refuses a feature whose gains are multiplied by what nothing says.

@@ -10,12 +10,14 @@ use super::cases::Case;
 use super::course::Course;
 use super::limited::{Limited, Watch};
 use super::step::{self, Planned, STEPS, Step};
+use super::task::Task;
 use super::{Stop, gain_keys, lift, signal};
 use crate::tool::control::law::Feature;
 
 /// What a task does with its features.
 pub(super) struct Trial<'a> {
     catalogue: &'a Catalogue,
+    task: &'a Task,
     /// Lets the sensor lift off at the end.
     request: Request,
     pub(super) outline: &'a Outline,
@@ -24,13 +26,18 @@ pub(super) struct Trial<'a> {
 
 impl<'a> Trial<'a> {
     /// A trial of a case, in a mode whose motions the node `adder` adds.
-    pub(super) fn new(catalogue: &'a Catalogue, case: &'a Case, mode: &'a OutlinedMode, adder: &str) -> Self {
+    pub(super) fn new(
+        catalogue: &'a Catalogue,
+        task: &'a Task,
+        case: &'a Case,
+        (mode, adder): (&'a OutlinedMode, &str),
+    ) -> Self {
         // With another setting, the mode and its setpoints may be others.
         let outline = &case.outline;
         let mode = outline.modes.iter().find(|one| one.name == mode.name).unwrap_or(mode);
-        let mut request = case.request.clone();
-        request.set.extend(lift::settings(outline, mode, adder, signal::measured(outline.period_s)));
-        Self { catalogue, request, outline, mode }
+        let lifts = lift::settings(outline, mode, adder, signal::measured(outline.period_s));
+        let request = task.with(&case.request, lifts);
+        Self { catalogue, task, request, outline, mode }
     }
 
     /// Returns the steps of a feature to and fro; `None` if its setpoint has none.
@@ -59,7 +66,8 @@ impl<'a> Trial<'a> {
         gains: &[String],
     ) -> Result<Run<Seen>, Stop> {
         let settings = [gains, &step::settings(self.mode, features, steps)].concat();
-        lift::unless_it_bounces(&self.request, &settings, self.mode, |request| self.attempt(features, steps, request))
+        let request = (self.task, &self.request);
+        lift::unless_it_bounces(request, &settings, self.mode, |request| self.attempt(features, steps, request))
     }
 
     /// Runs a request through steps of its features. Also returns whether the pad has bounced at the first touch.
@@ -74,7 +82,8 @@ impl<'a> Trial<'a> {
         let mut engine = Engine::new(compiled);
         let ports = features.iter().map(|feature| {
             let port = feature.error_port().unwrap_or_else(|| format!(".error.{}", feature.name));
-            PortColumns::find(engine.ports(), &port).ok_or_else(|| Stop::Refused(format!("no port is `{port}`")))
+            PortColumns::find(engine.ports(), &self.task.port(&port))
+                .ok_or_else(|| Stop::Refused(format!("no port is `{port}`")))
         });
         let ports: Vec<ScalarId> = ports.collect::<Result<_, _>>()?;
         let settling = signal::settling(period);
@@ -86,7 +95,7 @@ impl<'a> Trial<'a> {
             if course.has_stepped() {
                 limits.see(engine);
             }
-            course.see(engine.mode(), || ports.iter().map(read).collect());
+            course.see(self.task.mode(engine), || ports.iter().map(read).collect());
         });
         let outcome = outcome.map_err(|error| format!("the run cannot start: {error}"))?;
         let failure = match (&outcome.end, course.failure()) {

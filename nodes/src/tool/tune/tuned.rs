@@ -1,17 +1,23 @@
 //! What `tune` has found, as a whole.
 
 use serde::Serialize;
+use tactflow_runtime::graph::Outline;
 
 use super::cases::Stated;
+use super::gain_keys;
 use super::propose::TunedFeature;
 use super::ranges::Range;
 use super::settled::Settled;
+use super::task::Task;
 use crate::tool::control::choose::Wanted;
-use crate::tool::control::contacts::Contact;
+use crate::tool::control::contacts::{Answer, Contact};
 
 /// What `tune` has found.
 #[derive(Debug, Serialize)]
 pub(super) struct Tuned {
+    /// The task that is tuned, with the names of its own file.
+    #[serde(skip)]
+    pub(super) task: Task,
     pub(super) mode: String,
     /// The nodes that rest while it is measured and compared: they would move the sensor along the object.
     #[serde(skip_serializing_if = "Vec::is_empty")]
@@ -32,6 +38,16 @@ pub(super) struct Tuned {
 }
 
 impl Tuned {
+    /// Returns the gains that are proposed and not zero: where each stands in the file of the task, and its value.
+    pub(super) fn gains(&self, outline: &Outline) -> impl Iterator<Item = (String, f64)> {
+        let mode = outline.modes.iter().find(|mode| mode.name == self.mode);
+        let each = self.features.iter().filter_map(move |one| Some((one, one.feature.pid.as_ref()?, mode?, one.new?)));
+        each.flat_map(|(one, pid, mode, new)| {
+            let keys = ["kp", "ki", "kd"].into_iter().zip(new).filter(|(_, gain)| *gain != 0.0);
+            keys.map(|(key, gain)| (gain_keys::gain_key(pid, &one.name, key, mode), gain)).collect::<Vec<_>>()
+        })
+    }
+
     /// Returns what each bench states now: what was measured, and what it has stated of other features and objects.
     pub(super) fn stated(&self) -> Vec<Stated> {
         let mut benches: Vec<Stated> = Vec::new();
@@ -42,10 +58,43 @@ impl Tuned {
             let known = benches.iter_mut().find(|known| known.file == bench.file);
             let Some(Stated { contacts, .. }) = known else { continue };
             match contacts.iter_mut().find(|contact| contact.object == measured.object) {
-                Some(contact) => contact.features.extend(measured.features.clone()),
+                Some(contact) => measured.features.iter().for_each(|(name, answer)| update(contact, name, answer)),
                 None => contacts.push(measured.clone()),
             }
         }
         benches
+    }
+}
+
+/// Lets a contact state what was measured of a feature. What it states of the answer in time stays if only a play was
+/// measured.
+fn update(contact: &mut Contact, feature: &str, measured: &Answer) {
+    match contact.features.get_mut(feature).filter(|stated| stated.states_dynamics() && !measured.states_dynamics()) {
+        Some(stated) => stated.play = measured.play,
+        None => {
+            contact.features.insert(feature.to_owned(), measured.clone());
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_play_alone_leaves_what_a_bench_states_of_the_answer_in_time() {
+        let geometry = Answer::of_geometry("y").unwrap();
+        let measured = Answer { play: Some(0.007), ..geometry.clone() };
+        let resonant = Answer { resonance_hz: Some(1.7), ..geometry.clone() };
+        for (stated, expected) in [
+            (Some(resonant.clone()), Answer { play: Some(0.007), ..resonant }),
+            (Some(geometry), measured.clone()),
+            (None, measured.clone()),
+        ] {
+            let mut contact = Contact::unmeasured("ball".into());
+            contact.features.extend(stated.map(|stated| ("y".to_owned(), stated)));
+            update(&mut contact, "y", &measured);
+            assert_eq!(contact.features["y"], expected);
+        }
     }
 }

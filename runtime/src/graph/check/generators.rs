@@ -6,7 +6,7 @@ use super::carried::can_carry;
 use super::contact::{ContactPorts, is_sensor};
 use super::limits::limiters;
 use crate::graph::net::{CommandWire, Net, Wire};
-use crate::graph::plan::PortRef;
+use crate::graph::plan::{PortRef, Producer};
 use crate::node::Motion;
 use crate::signal::Kind;
 
@@ -114,8 +114,11 @@ impl Generators {
         let find = |is_still: &dyn Fn(usize) -> bool| find(net, contact, &drives, is_still);
         let usual = find(&|node| motions.usual[node] == Motion::Still);
         let of_modes = motions.changes.iter().enumerate().map(|(mode, changes)| {
-            let own = (!changes.is_empty()).then(|| find(&|node| motions.of(mode, node) == Motion::Still));
             let task = net.flat.modes[mode].task;
+            let shut = shut(net, mode);
+            let is_usual = changes.is_empty() && shut.is_empty();
+            let own =
+                (!is_usual).then(|| find(&|node| shut.contains(&node) || motions.of(mode, node) == Motion::Still));
             let generators = own.unwrap_or_else(|| usual.clone()).into_iter();
             generators.filter(|node| net.flat.task_with_modes(*node) == Some(task)).collect()
         });
@@ -137,6 +140,20 @@ impl Generators {
     pub(super) fn of(&self, mode: usize) -> &[usize] {
         &self.of_modes[mode]
     }
+}
+
+/// Returns the nodes that read nothing but a gate which is shut in this mode: the flag of another mode of its task.
+///
+/// What passes a flag on is none of them, because it may turn the flag around.
+fn shut(net: &Net<'_>, mode: usize) -> BTreeSet<usize> {
+    let task = net.flat.modes[mode].task;
+    let number = net.flat.modes[..mode].iter().filter(|other| other.task == task).count();
+    let is_other = |wire: &Wire| wire.source.producer == Producer::Task(task) && wire.source.port != number;
+    let is_shut = |node: &usize| {
+        let passes_flag = net.spec(*node).is_none_or(|spec| spec.outputs.iter().any(|port| port.kind == Kind::Flag));
+        !passes_flag && !net.wires[*node].is_empty() && net.wires[*node].iter().all(is_other)
+    };
+    (0..net.wires.len()).filter(is_shut).collect()
 }
 
 /// Returns the nodes that start a motion of the arm without a sample.

@@ -21,6 +21,8 @@ pub(crate) struct Loader {
     /// The values of sections that were written with a unit.
     pub(crate) measured: MeasuredValues,
     pub(super) open_parts: Vec<PathBuf>,
+    /// What overrides the files of parts.
+    pub(super) part_set: Vec<(PathBuf, Table)>,
     /// Whether the maximum number of parts is exceeded, so that loading stops.
     pub(super) is_full: bool,
     /// Whether a part that is a task has wrong roles, so that nothing is known about what it reads and commands.
@@ -47,6 +49,8 @@ impl Loader {
         let Assignments { graph: graph_set, bench: bench_set, limits: set_limits } = self.assignments(&request.set);
         let set_limits: Vec<_> =
             set_limits.iter().flat_map(|table| self.sections(|sections| sections.set_limits(table))).collect();
+        let of_parts = request.parts.iter().filter_map(|(file, text)| Some((canonical(file), self.assignment(text)?)));
+        self.part_set = of_parts.collect();
         let Some(mut root) = root else { return flat };
         if let Some(what) = wrong_file_type(&root.0, "graph") {
             let message = format!("this is {what}, not a graph");
@@ -274,6 +278,11 @@ impl Loader {
         self.diagnostics.push(diagnostic.help("for example `--set nodes.pid.gains.x.kp=3`"));
         None
     }
+}
+
+/// Returns the one name of a file that may have several; its own if it does not exist.
+pub(super) fn canonical(file: &Path) -> PathBuf {
+    file.canonicalize().unwrap_or_else(|_| file.to_path_buf())
 }
 
 /// The assignments of the command line: for the graph and the bench, which they replace, and for [limits], which they

@@ -1,9 +1,10 @@
 //! Expands the parts of a graph, each in a scope of its own.
 
 use std::collections::{BTreeMap, BTreeSet};
+use std::path::Path;
 
 use super::flat::{Entity, FlatGraph, FlatNode, Scope};
-use super::loader::{Loader, wrong_file_type};
+use super::loader::{Loader, canonical, wrong_file_type};
 use super::task::Task;
 use super::task_roles::TaskPart;
 use crate::graph::syntax::{Block, GraphDocument, OnFail, PartBlock, TASK_SECTIONS, Use, WireEntry};
@@ -93,7 +94,7 @@ impl Loader {
             self.is_full = true;
             return None;
         }
-        let canonical = file.path.canonicalize().unwrap_or_else(|_| file.path.clone());
+        let canonical = canonical(&file.path);
         if self.open_parts.contains(&canonical) {
             let message = format!("part `{}` contains itself", part.key.name);
             self.diagnostics.push(Diagnostic::new(Code::EndlessPart, file.span.clone(), message));
@@ -110,6 +111,7 @@ impl Loader {
         }
         self.sections(|sections| sections.correct_part(&mut root));
         ignore_bench(&mut root);
+        self.override_file(&canonical, &mut root);
         let strange = override_with(&mut root, &part.set);
         let mut document = self.sections(|sections| sections.part(&root));
         self.refuse_beside(&mut document);
@@ -155,6 +157,12 @@ impl Loader {
         let inner = self.flatten(document, &prefix, scope, flat);
         self.open_parts.pop();
         Some(inner)
+    }
+
+    /// Merges what the request says about a file of parts into its content.
+    fn override_file(&self, file: &Path, root: &mut Table) {
+        let own = self.part_set.iter().filter(|(of, _)| of == file);
+        own.for_each(|(_, set)| root.merge(set.clone()));
     }
 
     /// Returns the role of the graph for each name of a role in a part: those that the part lists, and those of the file
