@@ -292,6 +292,12 @@ fn the_play_of_a_contact_is_the_width_of_its_hysteresis() {
         let explained = loop_of(task, bench, place);
         let [play, step, late] = ["play", "step", "late_s"].map(|key| explained["play"][key].as_f64().unwrap());
         assert!((play / ran - 1.0).abs() < 0.2, "{task}, {bench}, {place}: {ran} m, explained {play} m");
+        // A step of 5 mm is smaller than the play along y.
+        let bench = format!("graphs/benches/{bench}.toml");
+        let text = say(&["explain", &format!("graphs/{task}.toml"), "--bench", &bench]).out;
+        let mut rows = text.lines().map(|line| line.split_whitespace().collect::<Vec<_>>());
+        let is_bound = rows.any(|row| row.contains(&place) && row.contains(&"up") && row.contains(&"Hz"));
+        assert_eq!(is_bound, place == "y", "{text}");
         assert!((late - play * explained["margins"]["ramp_lag_s"].as_f64().unwrap() / step).abs() < 1e-12);
     }
 }

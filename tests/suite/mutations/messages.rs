@@ -162,7 +162,7 @@ fn the_fixes_of_mutants_mend_them() {
     let (copy, fresh) = (Copy::new(), Copy::new());
     let mut random = Random::new(7, 0);
     let (mut tried, mut mended, mut wrong, mut left) = (0, 0, Vec::new(), Vec::new());
-    for _ in 0..number("TACTFLOW_FIXES", 120) {
+    for _ in 0..number("TACTFLOW_FIXES", 140) {
         let (graph, files) = GRAPHS[random.below(GRAPHS.len())];
         let (graph, file) = (copy.path(graph), copy.path(files[random.below(files.len())]));
         let text = fs::read_to_string(&file).unwrap();

@@ -248,6 +248,8 @@ fn place(one: &Stability) -> String {
 
 fn margins(one: &Stability) -> Option<[String; 9]> {
     let margins = one.margins.as_ref()?;
+    let is_held = one.play.as_ref().is_some_and(Play::hides_a_step);
+    let bandwidth = if is_held { format!("up to {}", margins.bandwidth()) } else { margins.bandwidth() };
     let stable = |text: String| if margins.is_stable { text } else { "unstable".to_owned() };
     Some([
         match (&one.object, one.by_geometry) {
@@ -260,7 +262,7 @@ fn margins(one: &Stability) -> Option<[String; 9]> {
         stable(or_none(margins.phase_deg, "deg", 0)),
         or_none(margins.gain_db, "dB", 1),
         stable(format!("{:.2}", margins.peak_sensitivity)),
-        stable(margins.bandwidth()),
+        stable(bandwidth),
         stable(margins.ramp_lag()),
         stable(format!("{:.3}", margins.noise)),
     ])

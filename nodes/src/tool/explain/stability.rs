@@ -48,6 +48,11 @@ impl Play {
         let late_s = play * margins.ramp_lag_s / step;
         Some(Self { play, step, late_s, texts: [play, step].map(|value| feature.in_units(value)) })
     }
+
+    /// Returns whether a step is smaller than the play: the contact then follows later than its bandwidth says.
+    pub(super) fn hides_a_step(&self) -> bool {
+        self.play > self.step
+    }
 }
 
 /// Returns the margins of all features that a law controls, with the contacts that the bench declares for the arm.
