@@ -1,9 +1,12 @@
 //! Blind motion in closed loop: an arm that feels nothing stops within its bound, whatever else runs beside it.
 
+use std::collections::BTreeSet;
+
 use nalgebra::Vector3;
 use tactflow_runtime::engine::Engine;
 use tactflow_runtime::graph::{Request, compile};
-use tactflow_runtime::signal::{Pose, Twist};
+use tactflow_runtime::node::NodeSpec;
+use tactflow_runtime::signal::{Flag, Kind, Pose, Scalar, Twist};
 use tactflow_tests::{catalogue, workspace};
 
 /// How far a sensor moved in a run. An approach is straight, and the arm vibrates, so it is the distance from the start.
@@ -124,6 +127,60 @@ fn a_gate_that_is_the_flag_of_a_mode_is_open_in_that_mode_alone() {
     let any = "nodes.other={ type = 'any', in.press = 'modes.press', in.seek = 'modes.seek' }";
     for other in [not, any] {
         assert_eq!(codes("other.is_met", &[other]), ["ungated-motion"], "{other}");
+    }
+}
+
+#[test]
+fn what_reads_a_flag_alone_writes_nothing_while_it_is_not_set() {
+    let catalogue = catalogue();
+    let reads_flag_alone = |spec: &NodeSpec| {
+        let others = spec.inputs.iter().any(|port| port.need.must_be_wired && port.kind != Kind::Flag);
+        let gives_flag = spec.outputs.iter().any(|port| port.kind == Kind::Flag);
+        !others && !gives_flag && spec.inputs.iter().any(|port| port.kind == Kind::Flag)
+    };
+    let specs = catalogue.nodes().iter().map(|node| node.spec());
+    let names: Vec<String> = specs.filter(reads_flag_alone).map(|spec| spec.name.into_owned()).collect();
+    assert_eq!(names, ["twist_source", "signal_generator"]);
+    let request = Request::file(workspace().join("graphs/hybrid.toml"))
+        .set("nodes.signal={ type = 'signal_generator', form = 'step', unit = '1', amplitude = 1.0 }")
+        .set("nodes.signal.in.gate='modes.servo'")
+        .set("nodes.push={ type = 'twist_source', in.gate = 'modes.servo', twist = [0, 0.001, 0, 0, 0, 0] }")
+        .set("nodes.sum.in.push='push.twist'");
+    let mut engine = engine(&request);
+    let mut seen = BTreeSet::new();
+    while let Some(next) = engine.next().filter(|next| *next < 2_000_000_000) {
+        engine.tick(next).unwrap_or_else(|fault| panic!("{fault}"));
+        // The mode of this tick is the one that the flag tells.
+        let is_open = engine.get::<Flag>("modes.servo") == Some(&true);
+        let writes = [engine.get::<Scalar>("signal.value").is_some(), engine.get::<Twist>("push.twist").is_some()];
+        assert_eq!(writes, [is_open; 2], "at {next} ns");
+        seen.insert(is_open);
+    }
+    assert_eq!(seen.len(), 2, "open and shut");
+}
+
+#[test]
+fn a_flag_that_is_made_of_what_rests_may_open_a_gate() {
+    // Nothing ends the motion of `push` in `idle`: the signal behind `small` rests there, and `idle` opens the gate.
+    let idle = "modes.idle.go={ to = 'approach', when = 'touch.present' }";
+    let signal = |amplitude: &str, gate: &str| {
+        format!(
+            "nodes.signal={{ type = 'signal_generator', form = 'step', unit = '1', amplitude = {amplitude}{gate} }}"
+        )
+    };
+    let small = "nodes.small={ type = 'compare', in.value = 'signal.value', above = -1.0 }";
+    let push = "nodes.push={ type = 'twist_source', twist = [0, 0.005, 0, 0, 0, 0], in.gate = 'other.is_met' }";
+    let wire = "nodes.sum.in.push='push.twist'";
+    let of_mode = signal("0.001", ", in.gate = 'modes.servo'");
+    let of_nothing = signal("0.0", "");
+    let any = |with: &str| format!("nodes.other={{ type = 'any', in.a = 'small.is_met', in.b = '{with}' }}");
+    for (signal, with) in [(&of_mode, "modes.idle"), (&of_mode, "arm.safety"), (&of_nothing, "small.is_met")] {
+        let other = any(with);
+        let sets = ["graph.start='idle'", idle, signal, small, &other, push, wire];
+        let request = Request::file(workspace().join("graphs/hybrid.toml"));
+        let request = sets.iter().fold(request, |request, set| request.set(*set));
+        let report = compile(&catalogue(), &request).err().unwrap_or_else(|| panic!("{signal}, {with}: it loads"));
+        assert!(report.render(false).contains("ungated-motion"), "{with}: {}", report.render(false));
     }
 }
 

@@ -302,6 +302,20 @@ fn the_play_of_a_contact_is_the_width_of_its_hysteresis() {
     }
 }
 
+#[test]
+fn a_step_that_is_smaller_than_the_play_is_answered_later_and_by_less_than_the_bandwidth() {
+    let steps = [0.002, 0.005, 0.008].map(|size| step("hybrid", "ball", "y", [0.0, size]).run());
+    let [small, usual, large] = [0, 1, 2].map(|i| bandwidth(&steps[i]));
+    // The ramp lag is the time constant without friction, and a contact that rests anywhere in its play begins later.
+    let lag = of_loop("hybrid", "ball", "y", "ramp_lag_s");
+    let late = loop_of("hybrid", "ball", "y")["play"]["late_s"].as_f64().unwrap();
+    let half = steps[1].iter().position(|y| *y > 0.5).unwrap() as f64 * PERIOD;
+    assert!((lag * 2.0_f64.ln()..lag * 2.0_f64.ln() + late).contains(&half), "{half} s, {lag} s, {late} s");
+    let explained = of_loop("hybrid", "ball", "y", "bandwidth_hz");
+    assert!(small < 0.4 * explained && usual < explained, "{small}, {usual}, explained {explained} Hz");
+    assert!((large / explained - 1.0).abs() < 0.2, "{large}, explained {explained} Hz");
+}
+
 /// The approaches of a mode, by the node that makes them.
 fn approach(args: &[&str], mode: &str, node: &str) -> Value {
     let explained = explained(args);

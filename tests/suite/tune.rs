@@ -163,6 +163,7 @@ fn what_cannot_be_tuned_says_why() {
         (&["graphs/finger_press.toml"], "`iscan` plays a recording, which does not answer the motion"),
         (&["tests/errors/wrong_columns.toml"], "a graph without modes has no mode to tune"),
         (&["graphs/hybrid.toml", "--feature", "x", "--set", "nodes.pid.gains.x.kp=-3"], "of `x` is negative: make it"),
+        (&["graphs/carry.toml", "--arm", "arm"], "no role `arm` is an arm; the arms are `left_arm`, `right_arm`"),
         (&["graphs/force.toml", "--peak", "0.9"], "it must be more than 1, as 1.7 is"),
     ] {
         let said = say(&[&["tune"], args].concat());
@@ -253,6 +254,9 @@ fn tuned_by_steps(from: f64) -> f64 {
         feature["answers"][0]["refused"].is_string() && feature["margins"] == serde_json::json!([null]),
         "{feature}"
     );
+    // A sine of 0.1 Hz and 9 mm without the controller has a hysteresis of 6.3 mm, by a program of its own.
+    let play = feature["answers"][0]["play"].as_f64().unwrap();
+    assert!((play / 0.0063 - 1.0).abs() < 0.2, "{play} m");
     let climbed = feature["climbed"].as_array().unwrap();
     let failed: Vec<&Value> = climbed.iter().filter(|rung| rung["failure"].is_string()).collect();
     assert!(failed.len() <= 1, "no larger gain is tried after one that fails: {climbed:?}");

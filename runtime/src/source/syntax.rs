@@ -45,9 +45,8 @@ pub fn parse_table(file: &SourceFile) -> Result<Value, Box<Diagnostic>> {
                 // A word without any quote may stand for a number.
                 if file.text[value.clone()].contains('"') {
                     diagnostic.help(did_you_mean(&quoted)).edit(Edit::Replace(at(value), quoted))
-                } else if text.starts_with('.') && text.parse::<f64>().is_ok() {
-                    let number = format!("0{text}");
-                    let message = "a number needs a digit in front of its point";
+                } else if let Some(number) = with_digits(&text) {
+                    let message = "a number needs a digit on each side of its point";
                     let diagnostic = Diagnostic { message: message.to_owned(), ..diagnostic };
                     diagnostic.help(did_you_mean(&number)).edit(Edit::Replace(at(value), number))
                 } else {
@@ -94,10 +93,21 @@ fn first_value(text: &str, key: &str, end: usize) -> Option<Range<usize>> {
     Some(found..found + key.len())
 }
 
-/// Returns whether a word can be meant as a string: it begins with a letter or a dot.
+/// Returns a number with the digit that is missing beside its point; `None` for what is no such number.
+fn with_digits(word: &str) -> Option<String> {
+    word.parse::<f64>().ok()?;
+    let (sign, digits) = word.split_at(word.len() - word.trim_start_matches(['-', '+']).len());
+    let (whole, part) = digits.split_once('.')?;
+    let one = |digits: &str| if digits.is_empty() { "0".to_owned() } else { digits.to_owned() };
+    (whole.is_empty() || part.is_empty()).then(|| format!("{sign}{}.{}", one(whole), one(part)))
+}
+
+/// Returns whether a word can be meant as a string: it begins with a letter or a dot. So can a number without a digit
+/// beside its point.
 fn is_text(word: &str) -> bool {
     let is_part = |c: char| c.is_ascii_alphanumeric() || "_-./:' ".contains(c);
-    word.starts_with(|c: char| c.is_ascii_alphabetic() || c == '.') && word.chars().all(is_part)
+    let begins = word.starts_with(|c: char| c.is_ascii_alphabetic() || c == '.');
+    begins && word.chars().all(is_part) || with_digits(word).is_some()
 }
 
 /// Returns the bracket or the quotes that are open at `at`, if they were opened on an earlier line and the line at `at`
@@ -213,13 +223,19 @@ mod tests {
     use crate::source::SourceMap;
 
     #[test]
-    fn a_number_that_begins_with_its_point_gets_a_digit() {
-        for (text, number) in [("x = .13\n", "0.13"), ("x = [1.0, .5]\n", "0.5")] {
+    fn a_number_gets_the_digit_that_is_missing_beside_its_point() {
+        for (text, word, number) in [
+            ("x = .13\n", ".13", "0.13"),
+            ("x = [1.0, .5]\n", ".5", "0.5"),
+            ("x = -.5\n", "-.5", "-0.5"),
+            ("x = [+.5, 1.0]\n", "+.5", "+0.5"),
+            ("x = { a = 2. }\n", "2.", "2.0"),
+        ] {
             let mut sources = SourceMap::default();
             let file = sources.add_file(Path::new("x.toml"), text).clone();
             let mistake = parse_table(&file).unwrap_err();
             let Some(Edit::Replace(place, written)) = mistake.fix.first() else { panic!("{mistake:?}") };
-            assert_eq!((text[file.local(place)].to_owned(), &**written), (number[1..].to_owned(), number));
+            assert_eq!((&text[file.local(place)], &**written), (word, number), "{text}");
         }
     }
 

@@ -9,7 +9,7 @@ use super::filters::{Filter, smoothing, way};
 use super::nodes::{Nodes, source};
 use super::schedule::Schedule;
 
-/// A usual step of a place [m], which is more than most contacts stick, and of an angle [rad].
+/// A usual step of a place [m] and of an angle [rad].
 const PLACE_STEP: f64 = 5e-3;
 const ANGLE_STEP: f64 = 0.05;
 

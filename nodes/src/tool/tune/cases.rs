@@ -8,18 +8,12 @@ use tactflow_runtime::graph::{Outline, Request, compile};
 use super::task::Task;
 use super::{TuneArgs, signal};
 use crate::tool::control::contacts::{Contact, contacts};
-use crate::tool::control::nodes::commands;
 
 /// A bench, and the contacts that it states.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Stated {
     pub(super) file: Option<PathBuf>,
     pub(super) contacts: Vec<Contact>,
-}
-
-/// Returns the name of the role of the first arm.
-fn arm_of(outline: &Outline) -> Option<&str> {
-    commands(outline).next().map(|command| command.arm)
 }
 
 /// What is measured: a graph on a bench, with a setting.
@@ -37,8 +31,14 @@ impl Case {
     }
 }
 
-/// Returns what is measured: each bench as it is, and with each of the settings. Simulated devices run long enough.
-pub(super) fn cases(args: &TuneArgs, request: &Request, task: &Task, shell: &Shell) -> Result<Vec<Case>, String> {
+/// Returns what is measured of an arm: each bench as it is, and with each of the settings. Simulated devices run long
+/// enough.
+pub(super) fn cases(
+    (args, arm): (&TuneArgs, &str),
+    request: &Request,
+    task: &Task,
+    shell: &Shell,
+) -> Result<Vec<Case>, String> {
     let benches = [None].into_iter().chain(args.others.iter().map(Some));
     let settings = || [None].into_iter().chain(args.also.iter().map(Some));
     let each = benches.flat_map(|bench| settings().map(move |also| (bench, also)));
@@ -49,7 +49,6 @@ pub(super) fn cases(args: &TuneArgs, request: &Request, task: &Task, shell: &She
         answers(compiled.outline())?;
         let outline = &task.outline(compiled.outline());
         request.set.extend(signal::long_enough(outline, signal::duration(outline.period_s)));
-        let arm = arm_of(outline).unwrap_or_default();
         let stated = Stated { file: bench_file(outline), contacts: contacts(compiled.facts(), arm)? };
         let stem = stated.file.as_ref().and_then(|file| file.file_stem());
         // Those with a setting are of the same object.

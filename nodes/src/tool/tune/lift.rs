@@ -64,9 +64,7 @@ pub(super) fn settings(outline: &Outline, mode: &OutlinedMode, adder: &str, afte
         format!("nodes.{MODE}_twist.twist=[0, 0, 0, 0, 0, 0]"),
         format!("nodes.{adder}.in.{MODE}={MODE}_twist.twist"),
     ];
-    if exits(mode, "done").any(|exit| exit.waits() > 0.0) {
-        set.push(format!("modes.{}.done=[{{ on = \"{MODE}\" }}]", mode.name));
-    }
+    set.extend(done(mode));
     for lift in [Some(MODE), can_lose(mode).then_some(LOST)].into_iter().flatten() {
         let projectors = outline.nodes.iter().filter(|node| node.kind.text == "projector");
         set.extend(projectors.map(|node| format!("modes.{lift}.set.{}.select=[0, 0, 0, 0, 0, 0]", node.name)));
@@ -74,6 +72,18 @@ pub(super) fn settings(outline: &Outline, mode: &OutlinedMode, adder: &str, afte
         set.push(format!("modes.{lift}.done={{ after_ms = {:?} }}", LASTS_S * 1e3));
     }
     set
+}
+
+/// Returns the setting of a mode without the exits `done` that only wait for a time; `None` if it has none of them.
+fn done(mode: &OutlinedMode) -> Option<String> {
+    let (timed, others): (Vec<Exit>, Vec<Exit>) = exits(mode, "done").partition(|exit| exit.waits() > 0.0);
+    if timed.is_empty() {
+        return None;
+    }
+    let others = others.into_iter().filter_map(|exit| Some(toml::Value::try_from(exit.value).ok()?.to_string()));
+    // Nothing deletes a setting, so a word that nobody sends stands in for an empty list.
+    let exits: Vec<String> = others.chain([format!("{{ on = \"{MODE}\" }}")]).collect();
+    Some(format!("modes.{}.done=[{}]", mode.name, exits.join(", ")))
 }
 
 /// Returns the setting that lets a mode go on to another one after so long [s], instead of its own exits `go`.
@@ -105,6 +115,24 @@ mod tests {
     use tactflow_runtime::graph::compile;
 
     use super::*;
+
+    #[test]
+    fn a_done_that_waits_for_a_time_is_off_and_the_others_stay() {
+        let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../graphs/seek_ridge.toml");
+        let done = |exits: &str| {
+            let request = Request::file(path).set(format!("modes.follow.done={exits}"));
+            let compiled = compile(&crate::catalogue(), &request).unwrap_or_else(|it| panic!("{}", it.render(false)));
+            done(compiled.outline().modes.iter().find(|mode| mode.name == "follow").unwrap())
+        };
+        let ridge = "{ when = \"ridge.on_ridge\", is = \"false\", for_ms = 100 }";
+        assert_eq!(done(&format!("[{ridge}]")), None);
+        let set = done(&format!("[{ridge}, {{ after_ms = 4000 }}]")).unwrap();
+        let (key, exits) = set.split_once('=').unwrap();
+        let exits: toml::Table = toml::from_str(&format!("done = {exits}")).unwrap();
+        let exits = exits["done"].as_array().unwrap();
+        assert_eq!((key, exits.len()), ("modes.follow.done", 2), "{exits:?}");
+        assert_eq!([exits[0]["when"].as_str(), exits[1]["on"].as_str()], [Some("ridge.on_ridge"), Some(MODE)]);
+    }
 
     #[test]
     fn every_mode_of_the_shipped_tasks_can_end_by_a_lift() {

@@ -40,7 +40,7 @@ use super::control::chain::{chain, smallest};
 use super::control::choose::Wanted;
 use super::control::collect::law;
 use super::control::contacts::Contact;
-use super::control::nodes::{Index, Nodes, commands};
+use super::control::nodes::{Index, Nodes};
 use cases::{Case, cases};
 use propose::Measurement;
 use ranges::Range;
@@ -82,6 +82,9 @@ pub(super) struct TuneArgs {
     /// Measure with this setting too, on each bench, for example with another setpoint; may be repeated
     #[arg(long = "also", value_name = "KEY=VALUE")]
     also: Vec<String>,
+    /// The role of the arm that is tuned; the first one if not given
+    #[arg(long, value_name = "ROLE")]
+    arm: Option<String>,
     /// The mode that is tuned; the one with the most features if not given
     #[arg(long)]
     mode: Option<String>,
@@ -179,14 +182,14 @@ fn writable(path: &Path) -> Result<(), String> {
 fn tune(args: &TuneArgs, shell: &Shell, request: &Request, compiled: Compiled) -> Result<Tuned, Stop> {
     let whole = compiled.outline().clone();
     cases::answers(&whole)?;
-    let command = commands(&whole).next().ok_or("no role is an arm, so nothing moves".to_owned())?;
+    let command = target::command(&whole, args.arm.as_deref())?;
     let index = Index::new(&whole);
     let (_, twist) = chain(&Nodes::new(&index, None), command.port)?;
     let task = target::task(&index, &twist, command.arm)?;
-    let ranges = Range::all(&Engine::new(compiled), &task);
+    let ranges = if task.file().is_none() { Range::all(&Engine::new(compiled)) } else { Vec::new() };
     let request = task.with(request, ranges.iter().flat_map(Range::opened));
     let outline = &task.outline(&whole);
-    let command = commands(outline).next().ok_or("nothing moves the arm".to_owned())?;
+    let command = target::command(outline, Some(command.arm))?;
     let index = Index::new(outline);
     let (limits, twist) = chain(&Nodes::new(&index, None), command.port)?;
     let (mode, controlled) = controlled(args, &index, &twist)?;
@@ -196,7 +199,7 @@ fn tune(args: &TuneArgs, shell: &Shell, request: &Request, compiled: Compiled) -
     resting.iter().for_each(|node| shell.say_beside(&format!("`{node}` rests meanwhile")));
     let request = task.with(&request, still);
     let wanted = Wanted { peak: args.peak, gain_db: args.gain_margin, phase_deg: args.phase_margin };
-    let cases: Vec<Case> = cases(args, &request, &task, shell)?;
+    let cases: Vec<Case> = cases((args, command.arm), &request, &task, shell)?;
     let pace = Pace::all(|key| smallest(&nodes, &limits, key));
     let measurement = Measurement { shell, task: &task, outline, mode, adder: &adder, cases: &cases, pace, wanted };
     let mut contacts: Vec<Contact> = cases.iter().map(Case::contact).collect();

@@ -236,19 +236,9 @@ fn followed(step: &Step) -> String {
 
 /// The lines for the files.
 pub(super) fn lines(tuned: &Tuned, outline: &Outline) -> String {
-    let mut sections: Vec<(String, String)> = Vec::new();
-    for (key, gain) in tuned.gains(outline) {
-        // Such as `nodes.pid`.
-        let end = key.match_indices('.').nth(1).map_or(key.len(), |(end, _)| end);
-        let (section, key) = (&key[..end], key[end..].trim_start_matches('.'));
-        if sections.last().is_none_or(|(last, _)| last != section) {
-            sections.push((section.to_owned(), String::new()));
-        }
-        sections.last_mut().into_iter().for_each(|(_, lines)| *lines += &format!("{key} = {gain:?}\n"));
-    }
     let file = tuned.task.file().map_or_else(String::new, |file| format!("# in {}\n", name(Some(file))));
-    let gains: Vec<String> = sections.iter().map(|(section, lines)| format!("[{section}]\n{lines}")).collect();
-    let mut text = if gains.is_empty() { String::new() } else { format!("\n{file}{}", gains.join("\n")) };
+    let gains = sections(tuned.gains(outline).map(|(key, [_, gain])| (key, gain)));
+    let mut text = if gains.is_empty() { String::new() } else { format!("\n{file}{gains}") };
     if !tuned.ranges.is_empty() {
         text += "\n[live]                              # in place of the old ranges\n";
     }
@@ -262,8 +252,40 @@ pub(super) fn lines(tuned: &Tuned, outline: &Outline) -> String {
     text
 }
 
+/// Returns gains as TOML, with one section for each node or mode.
+fn sections(gains: impl Iterator<Item = (String, f64)>) -> String {
+    let mut sections: Vec<(String, String)> = Vec::new();
+    for (key, gain) in gains {
+        // Such as `nodes.pid`.
+        let end = key.match_indices('.').nth(1).map_or(key.len(), |(end, _)| end);
+        let (section, key) = (&key[..end], key[end..].trim_start_matches('.'));
+        let line = format!("{key} = {gain:?}\n");
+        match sections.iter_mut().find(|(known, _)| known == section) {
+            Some((_, lines)) => *lines += &line,
+            None => sections.push((section.to_owned(), line)),
+        }
+    }
+    let sections: Vec<String> = sections.iter().map(|(section, lines)| format!("[{section}]\n{lines}")).collect();
+    sections.join("\n")
+}
+
 /// Returns the name of a file; that of a bench which has none.
 fn name(file: Option<&Path>) -> String {
     let name = file.and_then(Path::file_name).map(|name| name.to_string_lossy().into_owned());
     name.unwrap_or_else(|| "the bench".into())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_gains_of_a_node_and_a_mode_stand_in_one_section_each() {
+        let keys = ["nodes.pid.gains.x.kp", "modes.servo.set.pid.gains.x.ki", "nodes.pid.gains.x.kd"];
+        let text = sections(keys.into_iter().map(str::to_owned).zip([1.0, 2.0, 3.0]));
+        let read: toml::Table = toml::from_str(&text).unwrap();
+        let gains = read["nodes"]["pid"]["gains"]["x"].as_table().unwrap();
+        assert_eq!([&gains["kp"], &gains["kd"]].map(|gain| gain.as_float().unwrap()), [1.0, 3.0]);
+        assert_eq!(read["modes"]["servo"]["set"]["pid"]["gains"]["x"]["ki"].as_float(), Some(2.0));
+    }
 }

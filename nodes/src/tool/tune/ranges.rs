@@ -4,7 +4,6 @@ use tactflow_runtime::engine::Engine;
 use toml_edit::{InlineTable, Value};
 
 use super::propose::TunedFeature;
-use super::task::Task;
 
 /// Ends of the names of the gains that are tuned.
 const GAINS: [&str; 3] = [".kp", ".ki", ".kd"];
@@ -22,14 +21,13 @@ pub(super) struct Range {
 }
 
 impl Range {
-    /// Returns the ranges of all gains of a task; those of its parts stay as they are.
-    pub(super) fn all(engine: &Engine, task: &Task) -> Vec<Self> {
+    /// Returns the ranges of all gains of the graph itself; those of its parts stay as they are.
+    pub(super) fn all(engine: &Engine) -> Vec<Self> {
         let params = engine.live_values().map(|value| value.param);
         let is_gain =
             |name: &str| name.split('.').nth(1) == Some("gains") && GAINS.iter().any(|gain| name.ends_with(gain));
-        let own = params.filter_map(|it| Some((task.own(&it.name)?.to_owned(), it)));
-        let gains = own.filter(|(name, _)| is_gain(name));
-        gains.map(|(name, it)| Self { name, min: it.min, max: it.max, rate: it.rate }).collect()
+        let gains = params.filter(|param| is_gain(&param.name));
+        gains.map(|it| Self { name: it.name.clone(), min: it.min, max: it.max, rate: it.rate }).collect()
     }
 
     /// Returns the settings with which any gain can be tried.

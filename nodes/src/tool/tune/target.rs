@@ -1,12 +1,12 @@
 //! What is tuned: the features of one mode, and the node that takes the test signal.
 
-use tactflow_runtime::graph::{OutlinedBlock, OutlinedMode};
+use tactflow_runtime::graph::{Outline, OutlinedBlock, OutlinedMode};
 
 use super::TuneArgs;
 use super::task::Task;
 use crate::tool::control::collect::law;
 use crate::tool::control::law::Feature;
-use crate::tool::control::nodes::{Index, Nodes};
+use crate::tool::control::nodes::{Command, Index, Nodes, commands};
 use crate::tool::control::schedule::Schedule;
 
 /// Returns the mode that is tuned, and its features.
@@ -50,6 +50,19 @@ pub(super) fn controlled<'o>(
     }
     features.iter().try_for_each(has_a_known_schedule)?;
     Ok((*mode, features))
+}
+
+/// Returns the command of an arm, the first one if it has no name.
+pub(super) fn command<'o>(outline: &'o Outline, arm: Option<&str>) -> Result<Command<'o>, String> {
+    let all = || commands(outline);
+    let names: Vec<String> = all().map(|command| format!("`{}`", command.arm)).collect();
+    match (all().find(|command| arm.is_none_or(|arm| arm == command.arm)), arm) {
+        (Some(command), _) => Ok(command),
+        (None, Some(arm)) if !names.is_empty() => {
+            Err(format!("no role `{arm}` is an arm; the arms are {}", names.join(", ")))
+        }
+        _ => Err("no role is an arm, so nothing moves".to_owned()),
+    }
 }
 
 /// Returns the task that makes a twist: the graph itself, or a part of it with [inputs].

@@ -39,7 +39,14 @@ impl Task {
         }
         let flags = mode_flag(&self.port(""));
         let reads_mode = |node: &OutlinedBlock| node.wires.iter().any(|wire| wire.source.starts_with(&flags));
-        own.nodes.retain_mut(|node| self.strip(&mut node.name) || reads_mode(node));
+        own.nodes.retain_mut(|node| {
+            let is_own = self.strip(&mut node.name);
+            if !is_own {
+                // No name of a file begins with a dot.
+                node.name.insert(0, '.');
+            }
+            is_own || reads_mode(node)
+        });
         own.nodes.iter_mut().for_each(|node| self.names(node));
         own.modes.retain_mut(|mode| self.strip(&mut mode.name));
         own.tasks.retain_mut(|task| self.strip(&mut task.name));
@@ -59,13 +66,8 @@ impl Task {
 
     /// Takes the name of the task away from a name in it. Returns whether it is in it.
     fn strip(&self, name: &mut String) -> bool {
-        let own = self.own(name).map(str::to_owned);
+        let own = name.strip_prefix(&self.prefix).map(str::to_owned);
         own.map(|own| *name = own).is_some()
-    }
-
-    /// Returns a name of the graph as it stands in the file of the task; `None` if it is not in the task.
-    pub(super) fn own<'n>(&self, name: &'n str) -> Option<&'n str> {
-        name.strip_prefix(&self.prefix)
     }
 
     /// Returns a request with these settings of the task too.
@@ -73,7 +75,7 @@ impl Task {
         let mut request = request.clone();
         match &self.file {
             None => request.set.extend(settings),
-            Some(file) => request.parts.extend(settings.into_iter().map(|set| (file.clone(), set))),
+            Some(file) => request.part_set.extend(settings.into_iter().map(|set| (file.clone(), set))),
         }
         request
     }
@@ -117,7 +119,7 @@ mod tests {
         let commands: Vec<&str> = own.commands.iter().map(|wire| &*wire.source).collect();
         assert_eq!(commands, ["move.joints.velocity"]);
         let readers = own.nodes.iter().filter(|node| node.wires.iter().any(|wire| wire.source == "modes.hold"));
-        assert_eq!(readers.map(|node| &*node.name).collect::<Vec<_>>(), ["left_carries"]);
+        assert_eq!(readers.map(|node| &*node.name).collect::<Vec<_>>(), [".left_carries"]);
         let sum = own.nodes.iter().find(|node| node.name == "sum").unwrap();
         assert_eq!((&*sum.wires[0].source, &*sum.outputs[0].name), ("projector.twist", "sum.twist"));
         assert_eq!(task.port("sum.twist"), "left.sum.twist");

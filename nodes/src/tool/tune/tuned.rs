@@ -38,13 +38,15 @@ pub(super) struct Tuned {
 }
 
 impl Tuned {
-    /// Returns the gains that are proposed and not zero: where each stands in the file of the task, and its value.
-    pub(super) fn gains(&self, outline: &Outline) -> impl Iterator<Item = (String, f64)> {
+    /// Returns the gains that are proposed and not zero: where each stands in the file of the task, the old and the new one.
+    pub(super) fn gains(&self, outline: &Outline) -> impl Iterator<Item = (String, [f64; 2])> {
         let mode = outline.modes.iter().find(|mode| mode.name == self.mode);
         let each = self.features.iter().filter_map(move |one| Some((one, one.feature.pid.as_ref()?, mode?, one.new?)));
         each.flat_map(|(one, pid, mode, new)| {
-            let keys = ["kp", "ki", "kd"].into_iter().zip(new).filter(|(_, gain)| *gain != 0.0);
-            keys.map(|(key, gain)| (gain_keys::gain_key(pid, &one.name, key, mode), gain)).collect::<Vec<_>>()
+            let keys = ["kp", "ki", "kd"].into_iter().zip(one.old.into_iter().zip(new));
+            let keys = keys.filter(|(_, (_, new))| *new != 0.0);
+            let place = |key| gain_keys::gain_key(pid, &one.name, key, mode);
+            keys.map(|(key, (old, new))| (place(key), [old, new])).collect::<Vec<_>>()
         })
     }
 
@@ -66,10 +68,9 @@ impl Tuned {
     }
 }
 
-/// Lets a contact state what was measured of a feature. What it states of the answer in time stays if only a play was
-/// measured.
+/// Lets a contact state what was measured of a feature. What it states stays if only a play was measured.
 fn update(contact: &mut Contact, feature: &str, measured: &Answer) {
-    match contact.features.get_mut(feature).filter(|stated| stated.states_dynamics() && !measured.states_dynamics()) {
+    match contact.features.get_mut(feature).filter(|_| !measured.states_dynamics()) {
         Some(stated) => stated.play = measured.play,
         None => {
             contact.features.insert(feature.to_owned(), measured.clone());
@@ -82,13 +83,14 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_play_alone_leaves_what_a_bench_states_of_the_answer_in_time() {
+    fn a_play_alone_leaves_what_a_bench_states_of_the_answer() {
         let geometry = Answer::of_geometry("y").unwrap();
         let measured = Answer { play: Some(0.007), ..geometry.clone() };
-        let resonant = Answer { resonance_hz: Some(1.7), ..geometry.clone() };
+        let stated =
+            [Answer { resonance_hz: Some(1.7), ..geometry.clone() }, Answer { vy: Some(-0.85), ..Answer::default() }];
         for (stated, expected) in [
-            (Some(resonant.clone()), Answer { play: Some(0.007), ..resonant }),
-            (Some(geometry), measured.clone()),
+            (Some(stated[0].clone()), Answer { play: Some(0.007), ..stated[0].clone() }),
+            (Some(stated[1].clone()), Answer { play: Some(0.007), ..stated[1].clone() }),
             (None, measured.clone()),
         ] {
             let mut contact = Contact::unmeasured("ball".into());

@@ -7,7 +7,7 @@ use super::contact::{ContactPorts, is_sensor};
 use super::limits::limiters;
 use crate::graph::net::{CommandWire, Net, Wire};
 use crate::graph::plan::{PortRef, Producer};
-use crate::node::Motion;
+use crate::node::{Motion, NodeSpec};
 use crate::signal::Kind;
 
 /// The motion that each node generates: with the parameters of the graph, and where a mode changes them.
@@ -116,10 +116,11 @@ impl Generators {
         let of_modes = motions.changes.iter().enumerate().map(|(mode, changes)| {
             let task = net.flat.modes[mode].task;
             let shut = shut(net, mode);
-            let is_usual = changes.is_empty() && shut.is_empty();
-            let own =
-                (!is_usual).then(|| find(&|node| shut.contains(&node) || motions.of(mode, node) == Motion::Still));
-            let generators = own.unwrap_or_else(|| usual.clone()).into_iter();
+            let generators = match changes.is_empty() && shut.is_empty() {
+                true => usual.clone(),
+                false => find(&|node| shut.contains(&node) || motions.of(mode, node) == Motion::Still),
+            };
+            let generators = generators.into_iter();
             generators.filter(|node| net.flat.task_with_modes(*node) == Some(task)).collect()
         });
         let of_modes = of_modes.collect();
@@ -142,18 +143,22 @@ impl Generators {
     }
 }
 
-/// Returns the nodes that read nothing but a gate which is shut in this mode: the flag of another mode of its task.
-///
-/// What passes a flag on is none of them, because it may turn the flag around.
+/// Returns the nodes whose only wire is a gate that is shut in this mode: the flag of another mode of its task. Such a node
+/// writes nothing then, as docs/writing-a-node.md asks of it.
 fn shut(net: &Net<'_>, mode: usize) -> BTreeSet<usize> {
     let task = net.flat.modes[mode].task;
     let number = net.flat.modes[..mode].iter().filter(|other| other.task == task).count();
     let is_other = |wire: &Wire| wire.source.producer == Producer::Task(task) && wire.source.port != number;
     let is_shut = |node: &usize| {
-        let passes_flag = net.spec(*node).is_none_or(|spec| spec.outputs.iter().any(|port| port.kind == Kind::Flag));
-        !passes_flag && !net.wires[*node].is_empty() && net.wires[*node].iter().all(is_other)
+        let is_alone = matches!(&net.wires[*node][..], [wire] if is_other(wire));
+        is_alone && net.spec(*node).is_some_and(|spec| !has_flag(spec))
     };
     (0..net.wires.len()).filter(is_shut).collect()
+}
+
+/// Returns whether a node has an output that is a flag. Such a node may turn a flag around, so it is never still.
+fn has_flag(spec: &NodeSpec) -> bool {
+    spec.outputs.iter().any(|port| port.kind == Kind::Flag)
 }
 
 /// Returns the nodes that start a motion of the arm without a sample.
@@ -176,7 +181,7 @@ fn find(net: &Net<'_>, contact: &ContactPorts, drives: &Drives<'_>, is_still: &d
             continue;
         }
         let sources: Vec<usize> = wires().filter_map(|wire| wire.source.producer.node()).collect();
-        let all_still = !sources.is_empty() && sources.iter().all(|source| still[*source]);
+        let all_still = !has_flag(spec) && !sources.is_empty() && sources.iter().all(|source| still[*source]);
         let gives_motion = spec.outputs.iter().any(|port| matches!(port.kind, Kind::Twist | Kind::Joints));
         if is_still(node) || all_still {
             still[node] = true;

@@ -49,7 +49,8 @@ impl Loader {
         let Assignments { graph: graph_set, bench: bench_set, limits: set_limits } = self.assignments(&request.set);
         let set_limits: Vec<_> =
             set_limits.iter().flat_map(|table| self.sections(|sections| sections.set_limits(table))).collect();
-        let of_parts = request.parts.iter().filter_map(|(file, text)| Some((canonical(file), self.assignment(text)?)));
+        let of_parts =
+            request.part_set.iter().filter_map(|(file, text)| Some((canonical(file), self.assignment(text)?)));
         self.part_set = of_parts.collect();
         let Some(mut root) = root else { return flat };
         if let Some(what) = wrong_file_type(&root.0, "graph") {

@@ -111,8 +111,8 @@ impl Loader {
         }
         self.sections(|sections| sections.correct_part(&mut root));
         ignore_bench(&mut root);
-        self.override_file(&canonical, &mut root);
         let strange = override_with(&mut root, &part.set);
+        self.override_file(&canonical, &mut root);
         let mut document = self.sections(|sections| sections.part(&root));
         self.refuse_beside(&mut document);
         let wires: Vec<&Key> = part.wires.valid.iter().map(|wire| &wire.key).collect();

@@ -21,8 +21,8 @@ pub struct Request {
     /// Assignments `key=value` that override values of the files.
     pub set: Vec<String>,
     /// Assignments `key=value` that override values of the file of a part, each with that file. They hold for all parts
-    /// that use it.
-    pub parts: Vec<(PathBuf, String)>,
+    /// that use it, over what `set` of a part says.
+    pub part_set: Vec<(PathBuf, String)>,
     /// Fraction of the limits of speed and acceleration that is used, of the joints as well; `None` for all of it.
     pub slow: Option<f64>,
     /// Values of parameters that `[live]` lists, by their names there. They replace those of the files.
