@@ -184,6 +184,29 @@ fn a_flag_that_is_made_of_what_rests_may_open_a_gate() {
     }
 }
 
+#[test]
+fn a_number_that_is_0_may_become_a_motion() {
+    // The controller of a signal of 0 moves to its setpoint, and a multisine of 0 is done after a while.
+    let controlled = [
+        "nodes.zero={ type = 'signal_generator', form = 'step', unit = 'm', amplitude = 0.0, frame = 'pad' }",
+        "nodes.far={ type = 'feature_error', in.q = 'zero.value', setpoint.q = 0.01 }",
+        "nodes.near={ type = 'pid', in.error = 'far.error', gains.q.kp = 1.0 }",
+        "nodes.push={ type = 'inverse_jacobian', in.control = 'near.control', columns.q = [0, 1, 0, 0, 0, 0] }",
+    ];
+    let gated = [
+        "nodes.zero={ type = 'multisine', unit = '1', amplitude = 0.0, period = 1.0, min_frequency = 1.0, \
+         max_frequency = 2.0, periods = 1 }",
+        "nodes.push={ type = 'twist_source', in.gate = 'zero.done', twist = [0, 0.005, 0, 0, 0, 0] }",
+    ];
+    let idle = ["graph.start='idle'", "modes.idle.go={ to = 'approach', when = 'touch.present' }"];
+    for nodes in [&controlled[..], &gated] {
+        let request = Request::file(workspace().join("graphs/hybrid.toml")).set("nodes.sum.in.push='push.twist'");
+        let request = idle.iter().chain(nodes).fold(request, |request, set| request.set(*set));
+        let report = compile(&catalogue(), &request).err().unwrap_or_else(|| panic!("{nodes:?}: it loads"));
+        assert!(report.render(false).contains("ungated-motion"), "{}", report.render(false));
+    }
+}
+
 /// A right arm whose motion reads the force of the left arm's limiter, and whose guidance has this gate.
 fn coupled(gate: &str) -> Request {
     let blocks = [

@@ -100,7 +100,7 @@ pub(super) struct TuneArgs {
     /// Smallest phase margin [deg]
     #[arg(long, value_name = "DEG", default_value_t = Wanted::default().phase_deg)]
     phase_margin: f64,
-    /// Write the gains into the graph, and the contacts into the benches; comments stay
+    /// Write the gains into the graph or the file of its part, and the contacts into the benches; comments stay
     #[arg(long)]
     save: bool,
     /// Draw the loops with the proposed gains as a Bode plot, with the measured frequencies
@@ -193,6 +193,9 @@ fn tune(args: &TuneArgs, shell: &Shell, request: &Request, compiled: Compiled) -
     let index = Index::new(outline);
     let (limits, twist) = chain(&Nodes::new(&index, None), command.port)?;
     let (mode, controlled) = controlled(args, &index, &twist)?;
+    if args.save {
+        save::is_possible(&whole, &task, mode, &controlled)?;
+    }
     let adder = adder(&index, &twist)?;
     let nodes = Nodes::new(&index, Some(mode));
     let (resting, still) = still::settings(&nodes, mode, &law(&nodes, &twist));

@@ -3,6 +3,7 @@
 //! Several parts may use one file. They are tuned as one: each setting and the test signal reach all of them, so two arms
 //! that hold an object between them press at the same time.
 
+use std::collections::BTreeSet;
 use std::path::PathBuf;
 
 use tactflow_runtime::engine::Engine;
@@ -25,6 +26,15 @@ impl Task {
         Self { prefix: format!("{name}."), file: Some(file) }
     }
 
+    /// Returns all parts with the file of this one.
+    pub(super) fn alike(&self, outline: &Outline) -> Vec<Self> {
+        let is_of = |node: &OutlinedBlock, task: &str| node.name.rsplit_once('.').is_some_and(|(it, _)| it == task);
+        let is_here = |node: &OutlinedBlock| self.file.as_ref().is_some_and(|file| **file == *node.place.file);
+        let names = outline.tasks.iter().map(|task| &task.name);
+        let alike = names.filter(|name| outline.nodes.iter().any(|node| is_of(node, name) && is_here(node)));
+        alike.map(|name| Self { prefix: format!("{name}."), file: self.file.clone() }).collect()
+    }
+
     /// Returns the file of the part; `None` for the graph itself.
     pub(super) const fn file(&self) -> Option<&PathBuf> {
         self.file.as_ref()
@@ -39,15 +49,12 @@ impl Task {
         }
         let flags = mode_flag(&self.port(""));
         let reads_mode = |node: &OutlinedBlock| node.wires.iter().any(|wire| wire.source.starts_with(&flags));
+        let nodes: BTreeSet<&str> = outline.nodes.iter().map(|node| &*node.name).collect();
         own.nodes.retain_mut(|node| {
-            let is_own = self.strip(&mut node.name);
-            if !is_own {
-                // No name of a file begins with a dot.
-                node.name.insert(0, '.');
-            }
+            let is_own = self.rename(&mut node.name);
             is_own || reads_mode(node)
         });
-        own.nodes.iter_mut().for_each(|node| self.names(node));
+        own.nodes.iter_mut().for_each(|node| self.names(node, &nodes));
         own.modes.retain_mut(|mode| self.strip(&mut mode.name));
         own.tasks.retain_mut(|task| self.strip(&mut task.name));
         own.live.retain_mut(|range| self.strip(&mut range.name));
@@ -55,13 +62,29 @@ impl Task {
         own
     }
 
-    /// Gives the ports of a node the names of the file.
-    fn names(&self, node: &mut OutlinedBlock) {
+    /// Gives the ports of a node the names of the file. `nodes` are those of the graph.
+    fn names(&self, node: &mut OutlinedBlock, nodes: &BTreeSet<&str>) {
         let sources = node.wires.iter_mut().map(|OutlinedWire { source, .. }| source);
         let outputs = node.outputs.iter_mut().map(|output| &mut output.name);
-        sources.chain(outputs).for_each(|name| {
-            self.strip(name);
-        });
+        for name in sources.chain(outputs) {
+            let is_of_node = name.rsplit_once('.').is_some_and(|(node, _)| nodes.contains(node));
+            // Ports of roles have the same names everywhere.
+            if is_of_node {
+                self.rename(name)
+            } else {
+                self.strip(name)
+            };
+        }
+    }
+
+    /// Gives what is in the task its name there, and marks what is not by a dot, with which no name of a file begins.
+    /// Returns whether it is in the task.
+    fn rename(&self, name: &mut String) -> bool {
+        let is_own = self.strip(name);
+        if !is_own {
+            name.insert(0, '.');
+        }
+        is_own
     }
 
     /// Takes the name of the task away from a name in it. Returns whether it is in it.

@@ -7,7 +7,7 @@ use super::contact::{ContactPorts, is_sensor};
 use super::limits::limiters;
 use crate::graph::net::{CommandWire, Net, Wire};
 use crate::graph::plan::{PortRef, Producer};
-use crate::node::{Motion, NodeSpec};
+use crate::node::Motion;
 use crate::signal::Kind;
 
 /// The motion that each node generates: with the parameters of the graph, and where a mode changes them.
@@ -149,16 +149,8 @@ fn shut(net: &Net<'_>, mode: usize) -> BTreeSet<usize> {
     let task = net.flat.modes[mode].task;
     let number = net.flat.modes[..mode].iter().filter(|other| other.task == task).count();
     let is_other = |wire: &Wire| wire.source.producer == Producer::Task(task) && wire.source.port != number;
-    let is_shut = |node: &usize| {
-        let is_alone = matches!(&net.wires[*node][..], [wire] if is_other(wire));
-        is_alone && net.spec(*node).is_some_and(|spec| !has_flag(spec))
-    };
-    (0..net.wires.len()).filter(is_shut).collect()
-}
-
-/// Returns whether a node has an output that is a flag. Such a node may turn a flag around, so it is never still.
-fn has_flag(spec: &NodeSpec) -> bool {
-    spec.outputs.iter().any(|port| port.kind == Kind::Flag)
+    let is_alone = |node: &usize| matches!(&net.wires[*node][..], [wire] if is_other(wire));
+    (0..net.wires.len()).filter(is_alone).collect()
 }
 
 /// Returns the nodes that start a motion of the arm without a sample.
@@ -181,8 +173,12 @@ fn find(net: &Net<'_>, contact: &ContactPorts, drives: &Drives<'_>, is_still: &d
             continue;
         }
         let sources: Vec<usize> = wires().filter_map(|wire| wire.source.producer.node()).collect();
-        let all_still = !has_flag(spec) && !sources.is_empty() && sources.iter().all(|source| still[*source]);
         let gives_motion = spec.outputs.iter().any(|port| matches!(port.kind, Kind::Twist | Kind::Joints));
+        // A motion of what rests is none. A flag opens a gate whatever it is made of, and a number that is 0 can become an
+        // error or a setpoint.
+        let is_value = |wire: &&Wire| net.port(wire.source).kind != Kind::Flag;
+        let mut values = wires().filter(is_value).filter_map(|wire| wire.source.producer.node()).peekable();
+        let all_still = gives_motion && values.peek().is_some() && values.all(|source| still[source]);
         if is_still(node) || all_still {
             still[node] = true;
         } else if sources.iter().any(|source| moved[*source]) {
