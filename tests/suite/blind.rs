@@ -150,7 +150,7 @@ fn what_reads_a_flag_alone_writes_nothing_while_it_is_not_set() {
     let mut seen = BTreeSet::new();
     while let Some(next) = engine.next().filter(|next| *next < 2_000_000_000) {
         engine.tick(next).unwrap_or_else(|fault| panic!("{fault}"));
-        // The mode of this tick is the one that the flag tells.
+        // The flag is that of the tick that has just run.
         let is_open = engine.get::<Flag>("modes.servo") == Some(&true);
         let writes = [engine.get::<Scalar>("signal.value").is_some(), engine.get::<Twist>("push.twist").is_some()];
         assert_eq!(writes, [is_open; 2], "at {next} ns");

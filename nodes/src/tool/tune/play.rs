@@ -14,23 +14,24 @@ use super::spectrum::Line;
 use crate::tool::control::contacts::Answer;
 use crate::tool::control::law::Feature;
 
-/// Largest frequency that tells a play: a resonance answers more than geometry says [Hz].
+/// Largest frequency of the sines that count [Hz]. Near a resonance, the feature moves further than the sensor.
 const SLOW_HZ: f64 = 0.75;
-/// What is left of a sine that tells a play [1]: of less, the foam alone moves, and of more, noise is as large.
-const TELLS: RangeInclusive<f64> = 0.4..=0.85;
-/// Number of sines that must tell it.
+/// Share of a sine that is left if it counts [1]. With a smaller share, the contact may stick and only the foam moves. With
+/// a larger one, the loss is as small as the noise.
+const COUNTS: RangeInclusive<f64> = 0.4..=0.85;
+/// Number of sines that must count.
 const ENOUGH: usize = 2;
 /// Steps with which the play of a sine is found.
 const STEPS: usize = 50;
 
-/// Returns the play of a feature whose answer geometry says [m] or [rad]; `None` if it has none, or if no sine tells it.
+/// Returns the play of a place [m] or an angle [rad]. `None` if too few sines count, or if the feature is of another kind.
 pub(super) fn play<'a>(feature: &Feature, component: usize, lines: impl Iterator<Item = &'a Line>) -> Option<f64> {
     let whole = Answer::of_geometry(feature.quantity().unwrap_or(&feature.name))?.row()[component].abs();
     let known = known(feature, component);
     let slow = lines.filter(|line| line.counts() && line.omega <= 2.0 * PI * SLOW_HZ);
     let left = slow.map(|line| ((line.open / known(line.omega)).norm() / whole, line.amplitude));
     let mut found: Vec<f64> = left
-        .filter(|(left, _)| TELLS.contains(left))
+        .filter(|(left, _)| COUNTS.contains(left))
         .map(|(left, amplitude)| 2.0 * amplitude * inverse(left))
         .collect();
     found.sort_by(f64::total_cmp);
@@ -106,7 +107,7 @@ mod tests {
     }
 
     #[test]
-    fn two_sines_that_slide_tell_the_play_and_one_does_not() {
+    fn two_sines_that_count_give_the_play_and_one_does_not() {
         let play = found(&[0.3, 1.2, 2.4, 3.6, 30.0]).unwrap();
         assert!((play - 0.003).abs() < 2e-5, "{play}");
         assert_eq!(found(&[0.3, 1.2, 3.6, 30.0]), None);
