@@ -123,6 +123,7 @@ fn every_shipped_task_is_explained_for_a_person_and_for_a_page() {
         "in the mode `servo`",
         "-3.3",
         "`pid` lets the control of `x` grow by at most 0.25 m/s2",
+        "`pid` integrates errors of `pressure` up to 0.02 only",
         "At rest: wx, wy, wz.",
         "`move.contact` (`contact_limit`)",
         "force_n = 15.0",
@@ -150,6 +151,11 @@ fn one_port_is_explained_and_an_unknown_one_is_named() {
     let unknown = say(&["explain", "graphs/hybrid.toml", "move.bumples.twist"]);
     assert_eq!(unknown.code, 2);
     assert!(unknown.err.contains("no node writes `move.bumples.twist`"), "{}", unknown.err);
+    // What the graph itself names: a command, and what a part exports.
+    let loops = |page: &Value| page["motions"][0]["modes"][1]["loops"].clone();
+    assert_eq!(loops(&explained(&["graphs/hybrid.toml", "arm.velocity"])), loops(&all));
+    let exported = say(&["explain", "graphs/hybrid.toml", "move.velocity"]);
+    assert!(exported.err.contains("did you mean `move.joints.velocity`?"), "{}", exported.err);
 }
 
 /// The loops of the mode `servo`, each with the object and the feature.

@@ -3,6 +3,7 @@
 
 mod columns;
 mod good;
+mod mounts;
 mod poor;
 mod variant;
 
@@ -13,8 +14,9 @@ use tactflow_runtime::graph::{Request, compile};
 use tactflow_runtime::source::{Diagnostic, Report};
 use tactflow_tests::{catalogue, toml_files, workspace};
 
-use columns::{HALF_TURN, more_wrong_columns, wrong_columns};
+use columns::{more_wrong_columns, wrong_columns};
 use good::{good, good_at_second_sight, good_behind_nodes, good_by_modes, good_by_turns};
+use mounts::{good_mounts, half_turn, poor_mounts};
 use poor::{
     at_second_sight, never_reached, opposed, poor_behind_nodes, poor_filters_and_motions, poor_gains, poor_modes,
     poor_sums,
@@ -37,6 +39,7 @@ fn each_poor_controller_gets_its_warning_and_no_other() {
     let poor = [
         wrong_columns(),
         more_wrong_columns(),
+        poor_mounts(),
         poor_gains(),
         poor_modes(),
         poor_behind_nodes(),
@@ -73,7 +76,7 @@ fn each_poor_controller_gets_its_warning_and_no_other() {
 
 #[test]
 fn no_good_controller_is_blamed() {
-    let good = [good(), good_behind_nodes(), good_at_second_sight(), good_by_turns(), good_by_modes()]
+    let good = [good(), good_behind_nodes(), good_at_second_sight(), good_by_turns(), good_by_modes(), good_mounts()]
         .into_iter()
         .flatten()
         .collect::<Vec<_>>();
@@ -115,7 +118,7 @@ fn help(task: &'static str, changes: &[&str]) -> String {
 fn the_help_states_the_column_that_stands_behind_the_mount() {
     let contact = "set facts.arm.contacts=[{ object = \"ball\", x = { vx = 1.0 } }]";
     let columns = ["columns.x = [1, 0, 0, 0, 0, 0]", "columns.y = [0, 1, 0, 0, 0, 0]"];
-    let help = help("hybrid", &[&HALF_TURN[..], &columns, &[contact]].concat());
+    let help = help("hybrid", &[&half_turn()[..], &columns, &[contact]].concat());
     assert!(help.contains("the column must be [1, 0, 0, 0, 0, 0]"), "{help}");
 }
 

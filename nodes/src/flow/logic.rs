@@ -1,6 +1,8 @@
 //! `all`, `any` and `not`: flags from flags.
 
-use tactflow_runtime::node::{At, Describe, In, Inputs, Many, Mistake, Mistakes, Node, Out, Outputs, Setup, Tick};
+use tactflow_runtime::node::{
+    At, Describe, In, Inputs, Many, Mistake, Mistakes, Node, Out, Outputs, Reading, Setup, Tick,
+};
 use tactflow_runtime::signal::Flag;
 use tactflow_runtime::source::Code;
 
@@ -83,6 +85,11 @@ fn refuse_none(wires: usize) -> Result<(), Mistakes> {
     Err(mistake.help("wire each under a name of your choice: `in.left = \"label.present\"`").into())
 }
 
+/// Returns what the result of this many flags says: that of one alone is the same flag.
+const fn alone(wires: usize) -> Reading {
+    if wires == 1 { Reading::Same } else { Reading::Other }
+}
+
 /// Writes the `decisive` value if one flag has it, and the other value if none has. An absent flag is not set; without any
 /// flag the result is absent.
 fn combine(inputs: &Inputs<'_>, out: &mut Outputs, decisive: bool) {
@@ -99,6 +106,7 @@ impl Node for All {
     type State = ();
 
     fn new((): (), setup: &mut Setup<Self>) -> Result<Self, Mistakes> {
+        setup.reading = alone(setup.inputs.flag.len());
         refuse_none(setup.inputs.flag.len()).map(|()| Self)
     }
 
@@ -114,6 +122,7 @@ impl Node for Any {
     type State = ();
 
     fn new((): (), setup: &mut Setup<Self>) -> Result<Self, Mistakes> {
+        setup.reading = alone(setup.inputs.flag.len());
         refuse_none(setup.inputs.flag.len()).map(|()| Self)
     }
 
@@ -128,7 +137,8 @@ impl Node for Not {
     type Outputs = Outputs;
     type State = ();
 
-    fn new((): (), _: &mut Setup<Self>) -> Result<Self, Mistakes> {
+    fn new((): (), setup: &mut Setup<Self>) -> Result<Self, Mistakes> {
+        setup.reading = Reading::Opposite;
         Ok(Self)
     }
 

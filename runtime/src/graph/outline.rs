@@ -105,6 +105,7 @@ impl OutlineBuilder<'_> {
             name: node.name.clone(),
             wires,
             outputs,
+            passes: spec.limits.through,
             sample_s: planned.sample_s,
             ..self.block(&node.block, &spec.params, Some(planned.index))?
         })
@@ -145,6 +146,7 @@ impl OutlineBuilder<'_> {
             wires: Vec::new(),
             settings: self.table(block.params.as_table(), specs, "", node),
             outputs: Vec::new(),
+            passes: None,
             sample_s: 0.0,
         })
     }

@@ -9,8 +9,10 @@ pub enum Reading {
     /// Something else, or unknown.
     #[default]
     Other,
-    /// It is the same value, smoothed or later.
+    /// It is the same value or the same flag, smoothed or later.
     Same,
+    /// It is the flag that is set while the one that it reads is not.
+    Opposite,
     /// It is a flag, set while the number is between two bounds.
     Between {
         /// Lower bound, in the unit of the input; infinite if there is none.

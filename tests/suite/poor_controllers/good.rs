@@ -1,6 +1,5 @@
 //! Controllers as an integrator may write them.
 
-use super::columns::HALF_TURN;
 use super::variant::{Variant, cleared, compared, graph, search, variant, with_area, with_feature};
 
 /// The lines of all gains of a task, with each `kp` and `ki` times a factor.
@@ -338,10 +337,5 @@ pub(super) fn good_by_modes() -> Vec<Variant> {
         // Rolling that couples the axes a little, and a press that slides a little.
         variant("rolling", &["columns.x = [-1, 0, 0, 5, -20, 0]"]),
         variant("hybrid", &["columns.pressure = [0.3, 0, 1, 0, 0, 0]"]),
-        // A mount of half a turn about z, and columns in its frame.
-        variant(
-            "hybrid",
-            &[&HALF_TURN[..], &["columns.x = [1, 0, 0, 0, 0, 0]", "columns.y = [0, 1, 0, 0, 0, 0]"]].concat(),
-        ),
     ]
 }

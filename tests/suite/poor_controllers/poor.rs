@@ -1,6 +1,6 @@
 //! Controllers with one mistake, each with the code of its warning.
 
-use super::variant::{Variant, cleared, compared, gated, on, search, variant, with_area, with_feature};
+use super::variant::{Variant, cleared, compared, gated, on, search, through, variant, with_area, with_feature};
 
 /// Mistakes that nodes between the feature and the motion hide from a first look.
 pub(super) fn poor_behind_nodes() -> Vec<(&'static str, Variant)> {
@@ -88,6 +88,17 @@ pub(super) fn never_reached() -> Vec<(&'static str, Variant)> {
         ),
         ("unreachable-setpoint", variant("force", &["set parts.touch.set.label.min_force=16.0"])),
         ("unreachable-setpoint", variant("hold_without_slip", &["set nodes.grip.least_force=20.0"])),
+        // A contact that is lost before its force or its area is as small as that.
+        (
+            "unreachable-setpoint",
+            with_feature(
+                "edge",
+                "force",
+                "touch.force",
+                "[0, 0, 0.004, 0, 0, 0]",
+                &["set nodes.error.setpoint.force=0.3", "set parts.touch.set.label.min_force=0.4"],
+            ),
+        ),
         ("unreachable-setpoint", banded("edge", band("orientation", "{ inner = 0.5, outer = 1.6 }", "absent"))),
         ("unusual-gain", variant("rolling", &["gains.x = { kp = 2.0, limit = 0.0001 }"])),
         ("unusual-gain", variant("edge", &["gains.pressure = { kd = 0.05 }"])),
@@ -263,6 +274,9 @@ pub(super) fn poor_sums() -> Vec<(&'static str, Variant)> {
         ("windup", variant("hybrid", &["gains.pressure = { kp = 0.4, ki = 0.08, within = 0.2 }"])),
         ("unusual-gain", variant("hybrid", &["gains.x = { kp = 0.0 }"])),
         ("chattering-modes", variant("force", &compared("set nodes.firm.above=2.0"))),
+        // The opposite of one flag leads back, and no other flag stands beside it.
+        ("chattering-modes", through("not")),
+        ("chattering-modes", through("any")),
         (
             "chattering-modes",
             variant(
@@ -280,6 +294,7 @@ pub(super) fn poor_sums() -> Vec<(&'static str, Variant)> {
                 "touch.force",
                 "[0, 0, 0.02, 0, 0, 0]",
                 &[
+                    "set nodes.error.setpoint.force=4.0",
                     "set facts.arm.contacts=[{ object = \"pen\", pressure = { vz = 3.5, resonance_hz = 6.0, latency_ms = 18.0 }, force = { vz = 175.0, resonance_hz = 6.0, latency_ms = 18.0 } }]",
                     "gains.pressure = { kp = 2.0 }",
                 ],
@@ -329,7 +344,11 @@ pub(super) fn opposed() -> Vec<(&'static str, Variant)> {
                 "force",
                 "touch.force",
                 "[0, 0, 0.001, 0, 0, 0]",
-                &["set nodes.pid.gains.force.ki=0.2", "set nodes.pid.gains.force.within=0.5"],
+                &[
+                    "set nodes.error.setpoint.force=4.0",
+                    "set nodes.pid.gains.force.ki=0.2",
+                    "set nodes.pid.gains.force.within=0.5",
+                ],
             ),
         ),
         // It rests 2.9 mm beside the middle.
@@ -376,6 +395,18 @@ pub(super) fn at_second_sight() -> Vec<(&'static str, Variant)> {
         (
             "unused-column",
             variant("hybrid", &with_area(&["set modes.servo.done={ when = \"size.interpolated\", above = 0.001 }"])),
+        ),
+        // An integral that is too large for any gain in the same ratio.
+        ("low-margin", variant("hybrid", &["gains.x = { kp = 2.0, ki = 30.0, within = 0.003 }"])),
+        (
+            "low-margin",
+            variant(
+                "hybrid",
+                &[
+                    "gains.x = { kp = 2.0, ki = 0.5, within = 0.003 }",
+                    "set live.pid.gains.x.ki={ min = 0.0, max = 5000.0, rate = 10.0 }",
+                ],
+            ),
         ),
         // What an operator may set while the arm moves.
         ("low-margin", variant("hybrid", &["set live.pid.gains.y.kp.max=20.0"])),

@@ -128,6 +128,16 @@ pub(super) fn with_area(more: &[&'static str]) -> Vec<&'static str> {
     [&own, more].concat()
 }
 
+/// The same, where the way back passes a node of flags: `not`, or one that combines several and has one.
+pub(super) fn through(kind: &str) -> Variant {
+    let (input, is) = if kind == "not" { ("flag", "true") } else { ("firm", "false") };
+    let back = format!("set modes.eased.go={{ to = \"servo\", when = \"soft.is_met\", is = {is:?}, for_ms = 20 }}");
+    let node =
+        [format!("set nodes.soft.type={kind:?}"), format!("set nodes.soft.in={{ {input} = \"firm.is_met\" }}"), back];
+    let changes = compared("set nodes.firm.above=2.0").map(str::to_owned).into_iter().chain(node).collect();
+    Variant { task: "force", bench: None, changes }
+}
+
 /// A task that controls a feature more, with a setpoint of 0 and a gain of 1 1/s.
 pub(super) fn with_feature(task: &'static str, name: &str, port: &str, column: &str, changes: &[&str]) -> Variant {
     let more = [
@@ -136,6 +146,6 @@ pub(super) fn with_feature(task: &'static str, name: &str, port: &str, column: &
         format!("set nodes.pid.gains.{name}.kp=1.0"),
         format!("set nodes.jacobian.columns.{name}={column}"),
     ];
-    let changes = changes.iter().map(|change| (*change).to_owned()).chain(more).collect();
+    let changes = more.into_iter().chain(changes.iter().map(|change| (*change).to_owned())).collect();
     Variant { task, bench: None, changes }
 }

@@ -3,7 +3,7 @@
 mod fence;
 
 use tactflow_runtime::node::{
-    Absence, Describe, In, Inputs, Mistake, Mistakes, Node, Out, Outputs, Param, Setup, State, Tick,
+    Absence, Describe, In, Inputs, Limits, Mistake, Mistakes, Node, Out, Outputs, Param, Setup, State, Tick,
 };
 use tactflow_runtime::signal::{Flag, Image, ImageShape, Scalar, Twist};
 
@@ -98,6 +98,12 @@ impl Node for EdgeGuard {
     type Inputs<'a> = Inputs<'a>;
     type Outputs = Outputs;
     type State = State;
+
+    const LIMITS: Limits = Limits {
+        through: Some("twist"),
+        breaks: &["bumpless", "force", "peak", "wrench", "workspace", "blind", "speed", "acceleration"],
+        ..Limits::NONE
+    };
 
     fn new(params: Params, setup: &mut Setup<Self>) -> Result<Self, Mistakes> {
         let Params { margin_tactels: margin, ramp_tactels: ramp } = params;

@@ -2,6 +2,7 @@
 
 use serde::Serialize;
 
+use super::mount::still_pose;
 use super::nodes::{Nodes, source, toml};
 
 /// A node between the twist of a task and the command.
@@ -17,12 +18,13 @@ pub(crate) struct Limiter {
 /// Types that make the twist of a task, where the way back ends.
 const MAKERS: [&str; 5] = ["twist_adder", "projector", "pivot", "inverse_jacobian", "twist_source"];
 
-/// Returns the limiters before a port, the first one first, and the port of the twist before all of them.
+/// Returns the limiters before a port, the first one first, and the port of the twist before all of them. An `adjoint` of a
+/// pose that does not change turns the columns before it, so the way back ends there too.
 pub(crate) fn chain(nodes: &Nodes<'_>, port: &str) -> Result<(Vec<Limiter>, String), String> {
     let (mut limits, mut port) = (Vec::new(), port.to_owned());
     let writer = |port: &str| nodes.writer(port).ok_or_else(|| format!("no node writes `{port}`"));
     let mut node = writer(&port)?;
-    while !MAKERS.contains(&node.kind.text.as_str()) {
+    while !MAKERS.contains(&node.kind.text.as_str()) && still_pose(nodes, node).is_none() {
         let Some(input) = ["velocity", "twist"].into_iter().find_map(|input| source(node, input)) else { break };
         limits.push(Limiter {
             node: node.name.clone(),

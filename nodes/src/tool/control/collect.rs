@@ -6,11 +6,11 @@ use tactflow_runtime::signal::{Pose, Twist};
 
 use super::filters::Filter;
 use super::law::{Constant, Feature, Guidance, Law, feature};
+use super::mount::still_pose;
 use super::nodes::{Nodes, source};
 use super::shape::Shape;
 use crate::motion::COMPONENTS;
 use crate::motion::adjoint::adjoint;
-use crate::motion::pose::pose_of;
 
 /// What stands between a node and the twist of the arm.
 #[derive(Debug, Clone)]
@@ -156,6 +156,10 @@ fn collect<'a>(nodes: &Nodes<'a>, port: &str, passage: &Passage, law: &mut Law, 
                 feature
             }));
         }
+        // Between frames, an adjoint makes other components of the columns.
+        kind if kind != "adjoint" && node.passes.is_some() => {
+            node.passes.into_iter().for_each(|input| follow(input, passage, law));
+        }
         kind => {
             let is_wired = |i: usize| kind != "compose_twist" || source(node, COMPONENTS[i]).is_some();
             let (port, passes) = (port.to_owned(), passage.selecting(is_wired).moves());
@@ -179,24 +183,10 @@ pub(crate) fn projectors<'a>(nodes: &Nodes<'a>, port: &str) -> Vec<&'a OutlinedB
         "twist_adder" => node.wires.iter().flat_map(|wire| projectors(nodes, &wire.source)).collect(),
         "twist_switch" => nodes.sides(node).flat_map(|side| projectors(nodes, side)).collect(),
         "twist_gate" => all(&["value"]),
-        "pivot" | "adjoint" => all(&["twist"]),
+        "pivot" => all(&["twist"]),
         "projector" => [vec![node], all(&["twist"])].concat(),
-        _ => Vec::new(),
+        _ => node.passes.map_or_else(Vec::new, |input| all(&[input])),
     }
-}
-
-/// Returns the pose of an `adjoint`, if it does not change and leaves the frame what it is: the pad is mounted otherwise
-/// than the columns say. Into another frame, the columns stay those of the frame in which they are written.
-fn still_pose(nodes: &Nodes<'_>, node: &OutlinedBlock) -> Option<Pose> {
-    let adjoint = Some(node).filter(|node| node.kind.text == "adjoint")?;
-    let twist = source(adjoint, "twist")?;
-    let before = nodes.writer(twist)?.outputs.iter().find(|port| port.name == twist)?;
-    if before.frames != adjoint.outputs.first()?.frames {
-        return None;
-    }
-    let pose = nodes.writer(source(adjoint, "pose")?).filter(|node| node.kind.text == "static_pose")?;
-    let read = |key: &str| nodes.value(pose, key).map_or(Some([0.0; 3]), |value| value.value.read());
-    Some(Pose(pose_of(read("xyz")?, read("rpy")?)))
 }
 
 /// Adds what moves the sides of a switch.

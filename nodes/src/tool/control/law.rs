@@ -35,6 +35,11 @@ pub(crate) struct Feature {
     /// By how much its control may grow in a second [unit of the feature per s²].
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(crate) rise: Option<f64>,
+    /// Largest control, and the error from which on the integral rests.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(crate) limit: Option<f64>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(crate) within: Option<f64>,
     /// The port that is measured, before its filters.
     pub(crate) measured: Option<String>,
     pub(crate) setpoint: Option<f64>,
@@ -272,7 +277,7 @@ pub(super) fn feature<'a>(nodes: &Nodes<'a>, jacobian: &'a OutlinedBlock, name: 
     let (filters, gates) = way.map(|way| (way.filters, way.gates)).unwrap_or_default();
     let (sides, mount) = (Vec::new(), None);
     let [kp, ki, kd] = ["kp", "ki", "kd"].map(|which| number(which).unwrap_or(0.0));
-    let rise = number("rise");
+    let [rise, limit, within] = ["rise", "limit", "within"].map(number);
     let compared = error.map(|error| error.name.clone());
     let pid = pid.map(|pid| pid.name.clone());
     let schedules = scheduled.into_iter().filter_map(|node| Schedule::of(nodes, node, &name, measured.as_deref()));
@@ -284,6 +289,8 @@ pub(super) fn feature<'a>(nodes: &Nodes<'a>, jacobian: &'a OutlinedBlock, name: 
         ki,
         kd,
         rise,
+        limit,
+        within,
         measured,
         setpoint,
         period_s,

@@ -47,6 +47,15 @@ impl Margins {
         self.integral_s.map_or(first.clone(), |constant| format!("{first}, 0 after {:.1} s", 3.0 * constant))
     }
 
+    /// Returns the bandwidth as text, where friction can make a step slower: the largest one.
+    pub(crate) fn most_bandwidth(&self) -> String {
+        match (self.bandwidth_hz, self.bandwidth_range_hz) {
+            (Some(_), Some([low, high])) if high > WIDE * low => format!("up to {high:.1} Hz"),
+            (Some(hz), _) => format!("up to {hz:.2} Hz"),
+            (None, _) => "none".to_owned(),
+        }
+    }
+
     /// Returns the bandwidth as text: a range where it is no number.
     pub(crate) fn bandwidth(&self) -> String {
         match (self.bandwidth_hz, self.bandwidth_range_hz) {

@@ -14,6 +14,7 @@ pub(super) mod exits;
 pub(super) mod filters;
 pub(super) mod law;
 pub(super) mod margins;
+pub(super) mod mount;
 pub(super) mod nodes;
 pub(super) mod response;
 pub(super) mod schedule;

@@ -92,6 +92,11 @@ impl Loop {
         Self { kd: 0.0, ..self.clone() }
     }
 
+    /// Returns the same loop with a share of the integral gain of its own controller.
+    pub(crate) fn with_integral_share(&self, share: f64) -> Self {
+        Self { ki: self.ki * share, ..self.clone() }
+    }
+
     /// Returns the number of poles at zero: the motion integrates, and so does `ki`.
     pub(crate) fn integrators(&self) -> usize {
         if self.all().all(|one| one.ki == 0.0) { 1 } else { 2 }

@@ -12,6 +12,8 @@ use crate::tool::control::nodes::Nodes;
 pub(super) struct Approach {
     /// The node that makes it.
     pub(super) node: String,
+    /// Whether it searches for a lost contact.
+    pub(super) is_search: bool,
     /// Speed of the sensor [m/s].
     pub(super) speed_m_per_s: f64,
     /// Time until the arm follows a command: two periods, and the largest lag with which a contact answers a motion in
@@ -19,9 +21,14 @@ pub(super) struct Approach {
     pub(super) reaction_s: f64,
     /// Deceleration of the sensor [m/s²].
     pub(super) deceleration_m_per_s2: f64,
-    /// Distance from the tick that commands the stop until the sensor rests [m].
+    /// Lowest resonance along x or y that the bench states [Hz], and how far the arm swings with it after a stop, speed / ω
+    /// [m]; `None` if it states none.
+    pub(super) swing: Option<[f64; 2]>,
+    /// Largest distance from the tick that commands the stop until the sensor rests [m].
     pub(super) stopping_distance_m: f64,
     pub(super) impacts: Vec<Impact>,
+    /// The objects of which the bench does not state the resonance of the pressure.
+    pub(super) unknown_impacts: Vec<String>,
 }
 
 /// What the moving mass of the arm adds to the force at a touch.
@@ -40,13 +47,13 @@ pub(super) struct Impact {
 pub(super) fn approaches(nodes: &Nodes<'_>, limits: &[Limiter], law: &Law, contacts: &[Contact]) -> Vec<Approach> {
     let constants = law.constants.iter().map(|constant| {
         let [x, y, z, ..] = constant.twist;
-        (constant.node.clone(), [x, y, z])
+        (constant.node.clone(), [x, y, z], false)
     });
     let searches = limits.iter().filter_map(|limiter| {
         let node = nodes.node(&limiter.node)?;
-        Some((limiter.node.clone(), [0.0, 0.0, nodes.number(node, "search_m_per_s")?]))
+        Some((limiter.node.clone(), [0.0, 0.0, nodes.number(node, "search_m_per_s")?], true))
     });
-    let moves = |(_, velocity): &(String, [f64; 3])| velocity.iter().any(|part| *part != 0.0);
+    let moves = |(_, velocity, _): &(String, [f64; 3], bool)| velocity.iter().any(|part| *part != 0.0);
     constants.chain(searches).filter(moves).filter_map(|found| approach(nodes, limits, contacts, found)).collect()
 }
 
@@ -66,7 +73,7 @@ fn approach(
     nodes: &Nodes<'_>,
     limits: &[Limiter],
     contacts: &[Contact],
-    (node, velocity): (String, [f64; 3]),
+    (node, velocity, is_search): (String, [f64; 3], bool),
 ) -> Option<Approach> {
     let decelerations = ["linear_m_per_s2", "deceleration_m_per_s2"];
     let deceleration = decelerations.iter().filter_map(|key| smallest(nodes, limits, key)).min_by(f64::total_cmp)?;
@@ -76,8 +83,9 @@ fn approach(
     let latency = contacts.iter().map(|contact| lag_ms(contact, velocity));
     let reaction = 2.0 * nodes.period() + 1e-3 * latency.fold(0.0, f64::max);
     let stiffness = smallest(nodes, limits, "contact_n_per_m").filter(|_| into > 0.0);
+    let resonance = |contact: &Contact| contact.features.get("pressure").and_then(|pressure| pressure.resonance_hz);
     let impact = |contact: &Contact| {
-        let (stiffness, resonance) = (stiffness?, contact.features.get("pressure")?.resonance_hz?);
+        let (stiffness, resonance) = (stiffness?, resonance(contact)?);
         Some(Impact {
             object: contact.object.clone(),
             contact_n_per_m: stiffness,
@@ -85,12 +93,22 @@ fn approach(
             force_n: into * stiffness / (std::f64::consts::TAU * resonance),
         })
     };
+    let unknown = contacts.iter().filter(|contact| stiffness.is_some() && resonance(contact).is_none());
+    // Without a contact the arm swings as slowly as along the object, where the contact is hardly a spring.
+    let along = contacts.iter().flat_map(|contact| contact.features.values());
+    let along = along.filter(|answer| answer.vx.or(answer.vy).is_some());
+    let resonances = along.filter_map(|answer| answer.resonance_hz);
+    let swing = resonances.reduce(f64::min).map(|hz| [hz, speed / (std::f64::consts::TAU * hz)]);
+    let braking = speed * reaction + speed * speed / (2.0 * deceleration);
     Some(Approach {
         node,
+        is_search,
         speed_m_per_s: speed,
         reaction_s: reaction,
         deceleration_m_per_s2: deceleration,
-        stopping_distance_m: speed * reaction + speed * speed / (2.0 * deceleration),
+        stopping_distance_m: braking + swing.map_or(0.0, |[_, length]| length),
+        swing,
         impacts: contacts.iter().filter_map(impact).collect(),
+        unknown_impacts: unknown.map(|contact| contact.object.clone()).collect(),
     })
 }

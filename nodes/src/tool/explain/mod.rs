@@ -104,7 +104,7 @@ pub(super) fn run(args: ExplainArgs, shell: &Shell) -> Result<u8, u8> {
 fn explain(compiled: &Compiled, port: Option<&str>) -> Result<Explained, String> {
     let outline = compiled.outline();
     let index = Index::new(outline);
-    port.map_or(Ok(()), |port| is_motion(&index, port))?;
+    let port = port.map(|port| motion_port(&index, port)).transpose()?;
     let motions: Vec<Result<Motion, String>> = match port {
         Some(port) => vec![motion(compiled, &index, port.to_owned(), Command { arm: arm_behind(&index, port), port })],
         None => commands(outline).map(|one| motion(compiled, &index, format!("{}.velocity", one.arm), one)).collect(),
@@ -115,14 +115,29 @@ fn explain(compiled: &Compiled, port: Option<&str>) -> Result<Explained, String>
     Ok(Explained { period_s: outline.period_s, motions: motions.into_iter().collect::<Result<_, _>>()? })
 }
 
-/// Refuses a port that carries no motion.
-fn is_motion(index: &Index<'_>, port: &str) -> Result<(), String> {
-    let nodes = Nodes::new(index, None);
-    let output = nodes.writer(port).and_then(|node| node.outputs.iter().find(|output| output.name == port));
-    let other = output.filter(|output| !["twist", "joints"].contains(&output.kind));
-    other.map_or(Ok(()), |output| {
-        Err(format!("`{port}` carries {}: name a port that carries a twist or joint velocities", output.kind))
-    })
+/// Returns the port with this name, or the one that a command with this name reads.
+///
+/// # Errors
+/// If there is none, or if it carries no motion.
+fn motion_port<'a>(index: &Index<'a>, port: &'a str) -> Result<&'a str, String> {
+    if let Some(command) = commands(index.outline()).find(|one| format!("{}.velocity", one.arm) == port) {
+        return Ok(command.port);
+    }
+    let outputs = index.outline().nodes.iter().flat_map(|node| &node.outputs);
+    match outputs.clone().find(|output| output.name == port) {
+        Some(output) if ["twist", "joints"].contains(&output.kind) => Ok(port),
+        Some(output) => {
+            Err(format!("`{port}` carries {}: name a port that carries a twist or joint velocities", output.kind))
+        }
+        None => {
+            // A part exports the port of a node in it, often under its name.
+            let (first, last) = port.split_once('.').unwrap_or((port, port));
+            let is_inside = |name: &str| name.starts_with(&format!("{first}.")) && name.ends_with(&format!(".{last}"));
+            let inside = outputs.filter(|output| is_inside(&output.name)).last();
+            let help = inside.map(|output| format!(": did you mean `{}`?", output.name)).unwrap_or_default();
+            Err(format!("no node writes `{port}`{help}"))
+        }
+    }
 }
 
 /// Returns the role of the arm that a port moves; "" if it moves none.

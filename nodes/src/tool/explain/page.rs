@@ -14,7 +14,8 @@ use crate::tool::control::law::Feature;
 use crate::tool::control::schedule::Schedule;
 
 /// Columns of the table of features.
-const HEAD: [&str; 11] = ["feature", "setpoint", "vx", "vy", "vz", "wx", "wy", "wz", "kp, ki, kd", "delay", "measured"];
+const HEAD: [&str; 11] =
+    ["feature", "setpoint", "vx", "vy", "vz", "wx", "wy", "wz", "kp, ki, kd", "filter delay", "measured"];
 
 /// Columns of the table of loops.
 const LOOP_HEAD: [&str; 9] =
@@ -79,6 +80,7 @@ fn law(mode: &ModeLaw, style: &Style) -> String {
     let moving = || law.features.iter().filter(|one| one.moves());
     text += &moving().flat_map(|one| one.schedules.iter().map(|schedule| scheduled(one, schedule))).collect::<String>();
     text += &moving().filter_map(rising).collect::<String>();
+    text += &moving().filter_map(bounded).collect::<String>();
     text += &moving().filter_map(|feature| together(feature, &mode.loops)).collect::<String>();
     let off: Vec<String> =
         law.features.iter().filter(|one| !one.moves()).map(|one| format!("`{}`", one.name)).collect();
@@ -111,7 +113,9 @@ fn scheduled(feature: &Feature, schedule: &Schedule) -> String {
     let Schedule { node, min, max, nominal } = schedule;
     let range = format!("from {} to {}", number(*min), number(*max));
     let by = match nominal {
-        Some(nominal) => format!("by {} over the answer of the contact to vz, {range}", number(*nominal)),
+        Some(nominal) => {
+            format!("by {} / (answer of the contact to vz), {range}. A run estimates this answer", number(*nominal))
+        }
         None => format!("{range}, by what this command does not know: there are no margins"),
     };
     format!("`{node}` multiplies the gains of `{}` {by}.\n", feature.name)
@@ -126,6 +130,19 @@ fn rising(feature: &Feature) -> Option<String> {
         "`{pid}` lets the control of `{name}` grow by at most {rise} {unit}: a large error is reduced later than by kp \
          alone.\n"
     ))
+}
+
+/// Says how large the motion for a feature may become, and which errors its integral counts.
+fn bounded(feature: &Feature) -> Option<String> {
+    let pid = feature.pid.as_ref()?;
+    let name = &feature.name;
+    let unit = feature.unit().map_or_else(String::new, |unit| format!(" {unit}"));
+    let per_s = feature.unit().map_or_else(String::new, |unit| format!(" {unit}/s"));
+    let limit = feature.limit.map(|limit| format!("limits the control of `{name}` to {}{per_s}", number(limit)));
+    let within = feature.within.filter(|_| feature.ki != 0.0);
+    let within = within.map(|most| format!("integrates errors of `{name}` up to {}{unit} only", number(most)));
+    let both: Vec<String> = limit.into_iter().chain(within).collect();
+    (!both.is_empty()).then(|| format!("`{pid}` {}.\n", both.join(", and ")))
 }
 
 /// Says what else answers the same measurement, or presses too.
@@ -145,21 +162,38 @@ fn together(feature: &Feature, loops: &[Stability]) -> Option<String> {
     Some(format!("`{name}` of `{jacobian}` and {others} {what} together: their margins are those of the sum.\n"))
 }
 
+/// Says how far a motion goes on after a stop, and what it adds to the force at a touch.
 fn approach(approach: &Approach) -> String {
-    let Approach { node, speed_m_per_s, reaction_s, deceleration_m_per_s2, stopping_distance_m, impacts } = approach;
-    let [speed, distance, reaction] =
-        [speed_m_per_s, stopping_distance_m, reaction_s].map(|value| number((1e6 * value).round() * 1e-3));
-    let deceleration = number(*deceleration_m_per_s2);
+    let Approach { node, is_search, speed_m_per_s, reaction_s, stopping_distance_m, swing, .. } = approach;
+    let thousandths = |value: f64| number((1e6 * value).round() * 1e-3);
+    let [speed, distance, reaction] = [speed_m_per_s, stopping_distance_m, reaction_s].map(|value| thousandths(*value));
+    let from = if *is_search { format!("the search of `{node}`") } else { format!("`{node}`") };
+    let deceleration = number(approach.deceleration_m_per_s2);
+    let most = if swing.is_some() { " at most" } else { "" };
+    let swing = match swing {
+        Some([hz, length]) => {
+            format!("then {deceleration} m/s2, and a swing of {} mm at {} Hz", thousandths(*length), number(*hz))
+        }
+        None => {
+            format!(
+                "then {deceleration} m/s2. The bench states no resonance along x or y, so this leaves out how the arm swings on"
+            )
+        }
+    };
     let mut text = format!(
-        "From the {speed} mm/s of `{node}` a stop takes {distance} mm: {reaction} ms until the arm follows, then {deceleration} m/s2.\n"
+        "From the {speed} mm/s of {from} a stop takes {distance} mm{most}: {reaction} ms until the arm follows, {swing}.\n"
     );
-    for impact in impacts {
+    for impact in &approach.impacts {
         let [stiffness, resonance] = [impact.contact_n_per_m, impact.resonance_hz].map(number);
         let _ = writeln!(
             text,
             "  The impact on `{}` adds {:.1} N at most, by {stiffness} N/m and a resonance of {resonance} Hz.",
             impact.object, impact.force_n
         );
+    }
+    for object in &approach.unknown_impacts {
+        let _ =
+            writeln!(text, "  The impact on `{object}` is not known: the bench states no resonance of its pressure.");
     }
     text
 }
@@ -205,7 +239,8 @@ fn loops(loops: &[Stability], style: &Style) -> String {
         let _ = writeln!(
             text,
             "{GEOMETRY}: the bench states neither resonance nor latency nor response of this feature. Its margins leave out\n\
-             the arm and are too large, and a contact that sticks follows later. `tactflow tune` measures it."
+             the arm and are too large. The swing of the arm makes the bandwidth larger, and friction makes it smaller.\n\
+             `tactflow tune` measures this, unless friction hides it."
         );
     }
     text += &loops.iter().filter_map(sticking).collect::<String>();
@@ -248,8 +283,9 @@ fn place(one: &Stability) -> String {
 
 fn margins(one: &Stability) -> Option<[String; 9]> {
     let margins = one.margins.as_ref()?;
-    let is_held = one.play.as_ref().is_some_and(Play::hides_a_step);
-    let bandwidth = if is_held { format!("up to {}", margins.bandwidth()) } else { margins.bandwidth() };
+    // Of a loop by geometry, the swing of the arm can make it larger.
+    let is_held = one.play.as_ref().is_some_and(Play::holds_a_step) && !one.by_geometry;
+    let bandwidth = if is_held { margins.most_bandwidth() } else { margins.bandwidth() };
     let stable = |text: String| if margins.is_stable { text } else { "unstable".to_owned() };
     Some([
         match (&one.object, one.by_geometry) {

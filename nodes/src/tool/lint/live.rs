@@ -11,8 +11,8 @@ use crate::tool::control::law::Feature;
 use crate::tool::control::margins::margins;
 use crate::tool::control::response::Loop;
 
-/// Number of gains that are tried, each 5 % smaller than the one before: down to a two hundredth of the largest.
-const TRIED: usize = 104;
+/// Number of gains that are tried, each 5 % smaller than the one before: down to a ten thousandth of the largest.
+const TRIED: usize = 180;
 
 pub(super) fn check(arm: &Arm<'_>) -> Diagnostics {
     let loops = || arm.modes.iter().flat_map(|mode| mode.moving().map(move |feature| (mode, feature)));

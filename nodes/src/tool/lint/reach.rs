@@ -54,22 +54,32 @@ pub(super) enum Unreachable<'a> {
     },
     /// The pad feels the contact at larger values only.
     BelowThreshold {
-        /// The smallest value of a tactel that counts, in the unit of the setpoint.
+        /// The smallest value that counts, in the unit of the setpoint.
         threshold: f64,
         /// The node that drops smaller ones.
         node: &'a str,
+        /// What it drops.
+        what: &'static str,
     },
 }
+
+/// For each feature that needs a contact of some size: the type of the node that drops smaller ones, the keys of its bound,
+/// and what it drops.
+const LEAST_FELT: [(&str, (&str, &[&str], &str)); 3] = [
+    ("pressure", ("binarize", &["release", "threshold"], "tactels")),
+    ("force", ("label", &["min_force"], "contacts")),
+    ("area", ("label", &["min_area"], "contacts")),
+];
 
 /// Returns why a task never reaches the setpoint of a feature; `None` if it may reach it.
 pub(super) fn unreachable<'a>(arm: &Arm<'_>, mode: &ModeLaw<'a>, feature: &Feature) -> Option<Unreachable<'a>> {
     let (quantity, setpoint) = (mode.quantity(feature)?, feature.setpoint?);
-    let (most, key) = arm.force_limit(mode, quantity)?;
-    if setpoint >= most {
+    if let Some((most, key)) = arm.force_limit(mode, quantity).filter(|(most, _)| setpoint >= *most) {
         return Some(Unreachable::AboveLimit { most, key });
     }
-    let (threshold, node) = least_felt(mode, feature).filter(|_| quantity == "pressure")?;
-    (setpoint <= threshold && !lets_go(arm, mode)).then_some(Unreachable::BelowThreshold { threshold, node })
+    let (kind, keys, what) = LEAST_FELT.into_iter().find(|(of, ..)| *of == quantity).map(|(_, felt)| felt)?;
+    let (threshold, node) = least_felt(mode, feature, kind, keys)?;
+    (setpoint <= threshold && !lets_go(arm, mode)).then_some(Unreachable::BelowThreshold { threshold, node, what })
 }
 
 /// Returns the warning about a setpoint of a force that the task never reaches.
@@ -85,9 +95,9 @@ fn unreachable_setpoint(arm: &Arm<'_>, mode: &ModeLaw<'_>, feature: &Feature) ->
                 format!("write a setpoint well below {most}, or raise `{key}` in [limits]"),
             )
         }
-        Unreachable::BelowThreshold { threshold, node } => (
+        Unreachable::BelowThreshold { threshold, node, what } => (
             format!(
-                "the setpoint of `{name}` is {setpoint}, but `{node}` drops tactels below {threshold}: the contact is lost \
+                "the setpoint of `{name}` is {setpoint}, but `{node}` drops {what} below {threshold}: the contact is lost \
                  before it is reached"
             ),
             format!("write a setpoint well above {threshold}, for example {}", (3e6 * threshold).round() / 1e6),
@@ -122,10 +132,11 @@ fn lets_go(arm: &Arm<'_>, mode: &ModeLaw<'_>) -> bool {
     mode.releases().next().is_some() || mode.lost().filter_map(Exit::to).any(|to| arm.leaves(to))
 }
 
-/// Returns the smallest value of a tactel that a feature counts, and the node that drops smaller ones.
-fn least_felt<'a>(mode: &ModeLaw<'a>, feature: &Feature) -> Option<(f64, &'a str)> {
+/// Returns the smallest value that a node of this type counts upstream of a feature, and the node. The first of the keys
+/// that is given says it.
+fn least_felt<'a>(mode: &ModeLaw<'a>, feature: &Feature, kind: &str, keys: &[&str]) -> Option<(f64, &'a str)> {
     let nodes = mode.nodes.upstream(feature.measured.as_deref()?);
-    let node = nodes.into_iter().find(|node| node.kind.text == "binarize")?;
-    let value = |key: &str| mode.nodes.number(node, key);
-    Some((value("release").or_else(|| value("threshold"))?, &node.name))
+    let node = nodes.into_iter().find(|node| node.kind.text == kind)?;
+    let value = keys.iter().find_map(|key| mode.nodes.number(node, key))?;
+    Some((value, &node.name))
 }

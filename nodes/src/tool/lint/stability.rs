@@ -194,8 +194,7 @@ fn low_margin(
     let Some(factor) =
         factor(&loops, KEPT).filter(|factor| *factor < 1.0).and_then(|factor| quick(feature, &loops, factor))
     else {
-        return diagnostic
-            .help("no gain keeps the margins: use faster filters, or a smaller `ki` in proportion to `kp`");
+        return without_gain(mode, feature, &loops, diagnostic);
     };
     let gains = [("kp", feature.kp), ("ki", feature.ki), ("kd", feature.kd)];
     let gains = gains.map(|(key, gain)| (key, down_to_two_digits(gain * factor)));
@@ -206,6 +205,24 @@ fn low_margin(
     let places: Vec<_> = written.map(|(key, gain)| (mode.place_of_gain(feature, key), gain)).collect();
     places.into_iter().fold(diagnostic.help(help), |diagnostic, (place, gain)| {
         diagnostic.edit(Edit::Replace(place, format!("{gain:?}")))
+    })
+}
+
+/// Returns a warning with the way out of a loop that keeps its margins with no smaller gains in the same ratio: with a
+/// smaller integral, if that is enough.
+fn without_gain(mode: &ModeLaw<'_>, feature: &Feature, loops: &[Loop], diagnostic: Diagnostic) -> Diagnostic {
+    let is_good = |around: Loop| judge_loop(feature, &around).is_good();
+    let holds = |share: &f64| loops.iter().all(|around| is_good(around.with_integral_share(*share)));
+    let mut shares = std::iter::successors(Some(0.9), |share| Some(share * 0.9)).take(66).filter(|_| feature.ki > 0.0);
+    if let Some(ki) = shares.find(holds).map(|share| down_to_two_digits(feature.ki * share)) {
+        return diagnostic
+            .help(format!("write `ki = {ki}` or less in the gains of `{}`", feature.name))
+            .edit(Edit::Replace(mode.place_of_gain(feature, "ki"), format!("{ki:?}")));
+    }
+    let has_filters = feature.filters.iter().any(|filter| filter.shape.smooths());
+    diagnostic.help(match has_filters {
+        true => "no smaller gain keeps the margins: use faster filters",
+        false => "no smaller gain keeps the margins",
     })
 }
 

@@ -34,6 +34,8 @@ fn wrong(arm: &Arm<'_>, mode: &ModeLaw<'_>, feature: &Feature) -> Option<Diagnos
     match (changes && is_selected, geometry.is_needed) {
         (true, _) => judged.aside().or_else(|| judged.against()).or_else(|| reversed(arm, mode, feature)),
         (false, false) => reversed(arm, mode, feature),
+        // What the bench says about this object counts more than geometry.
+        (false, true) if judged.is_stated() => reversed(arm, mode, feature),
         (false, true) if changes => Some(judged.blocked()),
         (false, true) => judged.foreign(),
     }
@@ -113,6 +115,13 @@ impl JudgedColumn<'_> {
         rolls
             && slides.map(|other| column[other.component] * other.sign).sum::<f64>()
                 > column[known.component].abs() * LARGEST_RADIUS
+    }
+
+    /// Returns whether a contact of the bench states how the feature answers what moves.
+    fn is_stated(&self) -> bool {
+        let answers = self.arm.contacts.iter().filter_map(|contact| contact.features.get(self.quantity));
+        let mut moved = answers.map(|answer| answer.along(&self.feature.column));
+        moved.any(|change| change != 0.0)
     }
 
     /// Returns the warning about a column of which the projectors leave only what does not change the feature.

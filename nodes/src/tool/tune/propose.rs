@@ -113,6 +113,8 @@ impl TunedFeature {
 
 /// Proposed gains, as a multiple of those of the graph, with which a loop is not measured again [1].
 const NEAR: RangeInclusive<f64> = 0.83..=3.0;
+/// Gains that steps have found, as a multiple of those of the graph, with which a response that was hidden stays hidden [1].
+const ALIKE: RangeInclusive<f64> = 0.77..=1.3;
 /// Parts of its speed with which the test signal presses again, if it has ended the mode [1].
 const SLOWER: [f64; 2] = [0.4, 0.2];
 /// Shares of the gains of the graph with which a loop is measured again that loses its mode [1].
@@ -175,10 +177,29 @@ impl Measurement<'_> {
         }
         // What a test signal drives out of its mode may be near instability, and steps would not show it. Friction can hide
         // small motions, so what is known of them alone bounds the gains, and steps must show that they are good.
-        if found.0.is_hidden() || found.0.is_measured() && found.0.is_light() {
+        if found.0.is_measured() && found.0.is_light() {
             found.0 = self.climbed(found.0)?;
+        } else if found.0.is_hidden() {
+            found.0 = self.climbed(found.0)?;
+            found = self.again_with_what_was_found(feature, contacts, found, part)?;
         }
         Ok(found)
+    }
+
+    /// Measures a feature whose response was hidden with half of the gains that steps have found, unless these are near
+    /// those with which it was measured: a loop that is much too soft or too stiff hides its response. Returns what was
+    /// found before if that does not help.
+    fn again_with_what_was_found(
+        &self,
+        feature: &Feature,
+        contacts: &[Contact],
+        found: (TunedFeature, Vec<Contact>),
+        part: f64,
+    ) -> Result<(TunedFeature, Vec<Contact>), Stop> {
+        let Some(factor) = found.0.factor().filter(|factor| !ALIKE.contains(factor)) else { return Ok(found) };
+        self.shell.say_beside(&format!("`{}`: again, with half of the gains that were found", feature.name));
+        let again = self.measured(feature, contacts, HALF * factor, part)?;
+        Ok(if again.0.new.is_some() && !again.0.is_light() { again } else { found })
     }
 
     /// Compares gains of a feature by steps of its setpoint over all contacts, and proposes the best ones. A setpoint that

@@ -37,11 +37,23 @@ impl Readings {
         }
         let source = net.wires[node].iter().find(|wire| wire.input == 0)?.source;
         let test = match self.0[node] {
-            Reading::Same if matches!(test, Test::Between { .. }) => test,
+            Reading::Same if matches!(test, Test::Between { .. } | Test::Is(PortState::True | PortState::False)) => {
+                test
+            }
+            Reading::Opposite => opposite(test)?,
             Reading::Between { min, max, hysteresis } => bounds(test, [min, max], hysteresis)?,
             _ => return None,
         };
         Some((source, test))
+    }
+}
+
+/// Returns the test of a flag that holds when another one is its opposite.
+const fn opposite(test: Test) -> Option<Test> {
+    match test {
+        Test::Is(PortState::True) => Some(Test::Is(PortState::False)),
+        Test::Is(PortState::False) => Some(Test::Is(PortState::True)),
+        _ => None,
     }
 }
 
@@ -59,6 +71,17 @@ fn bounds(test: Test, [min, max]: [f64; 2], hysteresis: f64) -> Option<Test> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_flag_that_is_not_set_is_set_by_its_opposite() {
+        let of = |state| match opposite(Test::Is(state)) {
+            Some(Test::Is(state)) => Some(state),
+            _ => None,
+        };
+        assert_eq!(of(PortState::True), Some(PortState::False));
+        assert_eq!(of(PortState::False), Some(PortState::True));
+        assert_eq!(of(PortState::Absent), None);
+    }
 
     #[test]
     fn a_flag_is_cleared_beyond_its_hysteresis() {

@@ -135,7 +135,9 @@ pub(super) fn correct_block(table: &mut Table, names: &[String], reader: &mut Re
         }
     }
     correct_wires(table, names, reader);
-    table.entries.iter_mut().for_each(|(_, value)| correct_facts(value, reader));
+    // A wire has any name, and none is a fact.
+    let params = table.entries.iter_mut().filter(|(key, _)| key.name != "in");
+    params.for_each(|(_, value)| correct_facts(value, reader));
 }
 
 /// Corrects the key `in` of a block: it holds only ports of the given nodes, roles and parts.
