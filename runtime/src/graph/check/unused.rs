@@ -119,11 +119,13 @@ impl<'a> OpenInputs<'a> {
         let (outputs, scope) = (net.outputs(Producer::Node(node))?, net.flat.nodes[node].scope);
         let upstream = LazyCell::new(|| net.upstream([node]));
         let inputs = self.0.range((scope, 0, 0)..(scope + 1, 0, 0)).filter_map(|((.., i), (input, nodes))| {
-            let output = outputs.iter().find(|output| may_fit(output, input))?;
+            let output = outputs.iter().position(|output| may_fit(output, input))?;
             let other = nodes.iter().find(|other| !upstream[**other])?;
-            Some((*other, *i, input, output))
+            Some((output, *other, *i, input))
         });
-        let (other, _, input, output) = inputs.min_by_key(|(other, i, ..)| (*other, *i))?;
+        // The first output of a node is what it is made for.
+        let (output, other, _, input) = inputs.min_by_key(|(output, other, i, _)| (*output, *other, *i))?;
+        let output = &outputs[output];
         let (from, to) = (&net.flat.nodes[node].block.key.name, &net.flat.nodes[other].block.key.name);
         // A repeated input takes any name, for example that of the node.
         let name = if input.need.is_many { from } else { &*input.name };
