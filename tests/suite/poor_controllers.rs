@@ -123,6 +123,15 @@ fn the_help_states_the_column_that_stands_behind_the_mount() {
 }
 
 #[test]
+fn a_column_that_a_mode_sets_is_marked_where_it_stands() {
+    let text = |change: &str| variant("hybrid", &[change]).warnings().map(|report| report.render(false));
+    let found = text("set modes.servo.set.jacobian.columns.pressure=[0, 0, 30, 0, 0, 0]").unwrap();
+    assert!(found.contains("in mode `servo`, this column counts"), "{found}");
+    let found = text("columns.pressure = [0, 0, 30, 0, 0, 0]").unwrap();
+    assert!(!found.contains("this column counts"), "{found}");
+}
+
+#[test]
 fn an_exit_that_waits_for_another_error_does_not_need_this_one() {
     let changes = |when: &str| {
         [

@@ -89,6 +89,14 @@ impl<'a> ModeLaw<'a> {
         self.place(&feature.jacobian, &format!("columns.{}", feature.name))
     }
 
+    /// Returns the place of the column of a feature in the mode, if the mode sets another one than the graph.
+    pub(super) fn place_of_own_column(&self, feature: &Feature) -> Option<Range<usize>> {
+        let (node, path) = (self.nodes.node(&feature.jacobian)?, format!("columns.{}", feature.name));
+        let usual = node.settings.iter().find(|setting| setting.path == path)?;
+        let place = self.place_of_column(feature);
+        (place != usual.value.span && place != node.span).then_some(place)
+    }
+
     /// Returns the place of a gain of a feature.
     pub(super) fn place_of_gain(&self, feature: &Feature, gain: &str) -> Range<usize> {
         self.place(feature.pid.as_deref().unwrap_or_default(), &format!("gains.{}.{gain}", feature.name))

@@ -177,6 +177,11 @@ fn low_margin(
         ),
         None => diagnostic,
     };
+    let diagnostic = match mode.place_of_own_column(feature) {
+        Some(place) => diagnostic
+            .note(place, format!("{}this column counts: smaller entries here are another way out", mode.prefix())),
+        None => diagnostic,
+    };
     let diagnostic = feature.added(contacts).fold(diagnostic, |diagnostic, other| {
         let why = if other.measured == feature.measured { "answer the same measurement" } else { "move `vz`" };
         let note = format!("the loop of `{}` adds to it: both {why}", other.name);

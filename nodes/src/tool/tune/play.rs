@@ -19,23 +19,29 @@ const SLOW_HZ: f64 = 0.75;
 /// Share of a sine that is left if it counts [1]. With a smaller share, the contact may stick and only the foam moves. With
 /// a larger one, the loss is as small as the noise.
 const COUNTS: RangeInclusive<f64> = 0.4..=0.85;
+/// The same for a contact that hardly slides with any sine: the play is then at least that of these sines [1].
+const STICKS: RangeInclusive<f64> = 0.1..=0.4;
 /// Number of sines that must count.
 const ENOUGH: usize = 2;
 /// Steps with which the play of a sine is found.
 const STEPS: usize = 50;
 
-/// Returns the play of a place [m] or an angle [rad]. `None` if too few sines count, or if the feature is of another kind.
+/// Returns the play of a place [m] or an angle [rad]: the median of the sines that count, or else the largest one of those
+/// that hardly slide the contact. `None` if too few sines count, or if the feature is of another kind.
 pub(super) fn play<'a>(feature: &Feature, component: usize, lines: impl Iterator<Item = &'a Line>) -> Option<f64> {
     let whole = Answer::of_geometry(feature.quantity().unwrap_or(&feature.name))?.row()[component].abs();
     let known = known(feature, component);
     let slow = lines.filter(|line| line.counts() && line.omega <= 2.0 * PI * SLOW_HZ);
-    let left = slow.map(|line| ((line.open / known(line.omega)).norm() / whole, line.amplitude));
-    let mut found: Vec<f64> = left
-        .filter(|(left, _)| COUNTS.contains(left))
-        .map(|(left, amplitude)| 2.0 * amplitude * inverse(left))
-        .collect();
-    found.sort_by(f64::total_cmp);
-    (found.len() >= ENOUGH).then(|| found[found.len() / 2])
+    let left: Vec<(f64, f64)> =
+        slow.map(|line| ((line.open / known(line.omega)).norm() / whole, line.amplitude)).collect();
+    let of = |counts: RangeInclusive<f64>| {
+        let counted = left.iter().filter(|(left, _)| counts.contains(left));
+        let mut found: Vec<f64> = counted.map(|(left, amplitude)| 2.0 * amplitude * inverse(*left)).collect();
+        found.sort_by(f64::total_cmp);
+        (found.len() >= ENOUGH).then_some(found)
+    };
+    let at_least = || of(STICKS)?.last().copied();
+    of(COUNTS).map(|found| found[found.len() / 2]).or_else(at_least)
 }
 
 /// Returns what is left of a sine, for a play of so many times twice its amplitude.
@@ -111,5 +117,8 @@ mod tests {
         let play = found(&[0.3, 1.2, 2.4, 3.6, 30.0]).unwrap();
         assert!((play - 0.003).abs() < 2e-5, "{play}");
         assert_eq!(found(&[0.3, 1.2, 3.6, 30.0]), None);
+        // Only 13 and 30 % of these are left.
+        let play = found(&[0.3, 1.2, 1.8, 2.1]).unwrap();
+        assert!((play - 0.003).abs() < 2e-5, "{play}");
     }
 }
