@@ -130,9 +130,6 @@ pub struct OutlinedBlock {
     pub settings: Vec<Setting>,
     /// The outputs of a node.
     pub outputs: Vec<OutlinedPort>,
-    /// The input whose motion a limiter passes on.
-    #[serde(skip)]
-    pub passes: Option<&'static str>,
     /// Nominal time between two samples behind its outputs, at least that between two ticks [s]; 0 for a device.
     #[serde(skip)]
     pub sample_s: f64,

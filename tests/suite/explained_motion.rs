@@ -369,8 +369,9 @@ fn the_stopping_distance_bounds_that_of_an_arm_that_swings_in_the_air() {
             rows[from..].iter().map(way).fold(0.0, f64::max)
         });
         let longest = stops.into_iter().fold(0.0, f64::max);
-        assert_eq!(reach["swing"].is_array(), swings, "{bench}: {reach}");
-        assert!(longest > 0.0004 && (longest < distance || !swings), "{bench}: {stops:?} m, explained {distance} m");
+        assert_eq!(reach["swing"].is_object(), swings, "{bench}: {reach}");
+        // Without the swing, the distance is too small.
+        assert_eq!(longest < distance, swings, "{bench}: {stops:?} m, explained {distance} m");
     }
 }
 

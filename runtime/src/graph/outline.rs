@@ -105,7 +105,6 @@ impl OutlineBuilder<'_> {
             name: node.name.clone(),
             wires,
             outputs,
-            passes: spec.limits.through,
             sample_s: planned.sample_s,
             ..self.block(&node.block, &spec.params, Some(planned.index))?
         })
@@ -146,7 +145,6 @@ impl OutlineBuilder<'_> {
             wires: Vec::new(),
             settings: self.table(block.params.as_table(), specs, "", node),
             outputs: Vec::new(),
-            passes: None,
             sample_s: 0.0,
         })
     }

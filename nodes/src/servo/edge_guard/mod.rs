@@ -3,7 +3,7 @@
 mod fence;
 
 use tactflow_runtime::node::{
-    Absence, Describe, In, Inputs, Limits, Mistake, Mistakes, Node, Out, Outputs, Param, Setup, State, Tick,
+    Absence, Describe, In, Inputs, Mistake, Mistakes, Node, Out, Outputs, Param, Setup, State, Tick,
 };
 use tactflow_runtime::signal::{Flag, Image, ImageShape, Scalar, Twist};
 
@@ -21,7 +21,7 @@ use fence::{Fence, guarded};
 /// contact. Outward rolling (wy < 0 at the +x side, wx > 0 at the +y side, and the opposite signs at the opposite
 /// sides) is scaled by the same fraction. Inward motion, vz and wz pass unchanged.
 ///
-/// Put it behind the `twist_adder` and directly before the `adjoint`, so that it guards guidance as well. The output is
+/// Put it behind the `twist_adder` and before the limits, so that it guards guidance as well. The output is
 /// as old as the contact or the twist, whichever is older.
 ///
 /// Without a contact every motion passes, so that the sensor can approach an object. The last contact is remembered for
@@ -98,12 +98,6 @@ impl Node for EdgeGuard {
     type Inputs<'a> = Inputs<'a>;
     type Outputs = Outputs;
     type State = State;
-
-    const LIMITS: Limits = Limits {
-        through: Some("twist"),
-        breaks: &["bumpless", "force", "peak", "wrench", "workspace", "blind", "speed", "acceleration"],
-        ..Limits::NONE
-    };
 
     fn new(params: Params, setup: &mut Setup<Self>) -> Result<Self, Mistakes> {
         let Params { margin_tactels: margin, ramp_tactels: ramp } = params;

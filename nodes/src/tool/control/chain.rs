@@ -18,14 +18,26 @@ pub(crate) struct Limiter {
 /// Types that make the twist of a task, where the way back ends.
 const MAKERS: [&str; 5] = ["twist_adder", "projector", "pivot", "inverse_jacobian", "twist_source"];
 
-/// Returns the limiters before a port, the first one first, and the port of the twist before all of them. An `adjoint` of a
-/// pose that does not change turns the columns before it, so the way back ends there too.
-pub(crate) fn chain(nodes: &Nodes<'_>, port: &str) -> Result<(Vec<Limiter>, String), String> {
-    let (mut limits, mut port) = (Vec::new(), port.to_owned());
+/// The way from the twist of a task to a command.
+pub(crate) struct Chain {
+    /// The nodes between them, the first one first.
+    pub(crate) limits: Vec<Limiter>,
+    /// The port of the twist before all of them.
+    pub(crate) twist: String,
+    /// The port from which on the columns count: that of the last `adjoint` among these nodes that turns them, or `twist`.
+    pub(crate) turned: String,
+}
+
+/// Returns the way to a port.
+pub(crate) fn chain(nodes: &Nodes<'_>, port: &str) -> Result<Chain, String> {
+    let (mut limits, mut port, mut turned) = (Vec::new(), port.to_owned(), None);
     let writer = |port: &str| nodes.writer(port).ok_or_else(|| format!("no node writes `{port}`"));
     let mut node = writer(&port)?;
-    while !MAKERS.contains(&node.kind.text.as_str()) && still_pose(nodes, node).is_none() {
+    while !MAKERS.contains(&node.kind.text.as_str()) {
         let Some(input) = ["velocity", "twist"].into_iter().find_map(|input| source(node, input)) else { break };
+        if turned.is_none() && still_pose(nodes, node).is_some() {
+            turned = Some(port.clone());
+        }
         limits.push(Limiter {
             node: node.name.clone(),
             kind: node.kind.text.clone(),
@@ -38,7 +50,8 @@ pub(crate) fn chain(nodes: &Nodes<'_>, port: &str) -> Result<(Vec<Limiter>, Stri
         }
     }
     limits.reverse();
-    Ok((limits, port))
+    let turned = turned.unwrap_or_else(|| port.clone());
+    Ok(Chain { limits, twist: port, turned })
 }
 
 /// Returns the smallest value that the limiters have for a parameter.

@@ -25,6 +25,8 @@ struct Passage {
     delays: Vec<Filter>,
 }
 
+/// Types that pass on the motion of the features, and bound it in no direction by a number of their own.
+const PASSED: [&str; 4] = ["pivot", "edge_guard", "arm_damping", "bumpless"];
 /// Largest share of a motion, beside its largest component, that counts as 0 [1].
 const REST: f64 = 1e-4;
 
@@ -133,7 +135,7 @@ fn collect<'a>(nodes: &Nodes<'a>, port: &str, passage: &Passage, law: &mut Law, 
                 nodes.value(node, "select").and_then(|select| select.value.read()).unwrap_or_default();
             follow("twist", &passage.selecting(|i| select[i] != 0.0), law);
         }
-        "pivot" => follow("twist", passage, law),
+        kind if PASSED.contains(&kind) => follow("twist", passage, law),
         "twist_switch" => switch(nodes, node, passage, law, path),
         "twist_gate" => {
             let flag = source(node, "gate");
@@ -155,10 +157,6 @@ fn collect<'a>(nodes: &Nodes<'a>, port: &str, passage: &Passage, law: &mut Law, 
                 feature.mount.clone_from(&passage.mount);
                 feature
             }));
-        }
-        // Between frames, an adjoint makes other components of the columns.
-        kind if kind != "adjoint" && node.passes.is_some() => {
-            node.passes.into_iter().for_each(|input| follow(input, passage, law));
         }
         kind => {
             let is_wired = |i: usize| kind != "compose_twist" || source(node, COMPONENTS[i]).is_some();
@@ -183,9 +181,9 @@ pub(crate) fn projectors<'a>(nodes: &Nodes<'a>, port: &str) -> Vec<&'a OutlinedB
         "twist_adder" => node.wires.iter().flat_map(|wire| projectors(nodes, &wire.source)).collect(),
         "twist_switch" => nodes.sides(node).flat_map(|side| projectors(nodes, side)).collect(),
         "twist_gate" => all(&["value"]),
-        "pivot" => all(&["twist"]),
         "projector" => [vec![node], all(&["twist"])].concat(),
-        _ => node.passes.map_or_else(Vec::new, |input| all(&[input])),
+        kind if kind == "adjoint" || PASSED.contains(&kind) => all(&["twist"]),
+        _ => Vec::new(),
     }
 }
 

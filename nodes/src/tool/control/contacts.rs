@@ -159,10 +159,10 @@ impl Contact {
     }
 
     /// Returns whether geometry alone says how a feature answers: the bench states neither a resonance nor a latency nor a
-    /// response, for the feature or for the whole contact.
+    /// response of it. The latency of the contact still counts.
     pub(crate) fn is_by_geometry(&self, feature: &str) -> bool {
-        let is_stated = self.latency_ms > 0.0 || self.features.get(feature).is_some_and(Answer::states_dynamics);
-        !is_stated && Answer::of_geometry(feature).is_some()
+        let stated = self.features.get(feature);
+        !stated.is_some_and(Answer::states_dynamics) && Answer::of_geometry(feature).is_some()
     }
 
     /// Returns how a feature answers: as the bench says, or else by geometry.

@@ -21,14 +21,22 @@ pub(super) struct Approach {
     pub(super) reaction_s: f64,
     /// Deceleration of the sensor [m/s²].
     pub(super) deceleration_m_per_s2: f64,
-    /// Lowest resonance along x or y that the bench states [Hz], and how far the arm swings with it after a stop, speed / ω
-    /// [m]; `None` if it states none.
-    pub(super) swing: Option<[f64; 2]>,
+    /// How the arm swings after a stop; `None` if the bench states no resonance along x or y.
+    pub(super) swing: Option<Swing>,
     /// Largest distance from the tick that commands the stop until the sensor rests [m].
     pub(super) stopping_distance_m: f64,
     pub(super) impacts: Vec<Impact>,
     /// The objects of which the bench does not state the resonance of the pressure.
     pub(super) unknown_impacts: Vec<String>,
+}
+
+/// The swing of an arm with springs in its joints after a stop in the air.
+#[derive(Debug, Serialize)]
+pub(super) struct Swing {
+    /// Lowest resonance along x or y that the bench states [Hz].
+    pub(super) resonance_hz: f64,
+    /// Speed / ω [m].
+    pub(super) length_m: f64,
 }
 
 /// What the moving mass of the arm adds to the force at a touch.
@@ -98,7 +106,8 @@ fn approach(
     let along = contacts.iter().flat_map(|contact| contact.features.values());
     let along = along.filter(|answer| answer.vx.or(answer.vy).is_some());
     let resonances = along.filter_map(|answer| answer.resonance_hz);
-    let swing = resonances.reduce(f64::min).map(|hz| [hz, speed / (std::f64::consts::TAU * hz)]);
+    let swing = resonances.reduce(f64::min);
+    let swing = swing.map(|hz| Swing { resonance_hz: hz, length_m: speed / (std::f64::consts::TAU * hz) });
     let braking = speed * reaction + speed * speed / (2.0 * deceleration);
     Some(Approach {
         node,
@@ -106,7 +115,7 @@ fn approach(
         speed_m_per_s: speed,
         reaction_s: reaction,
         deceleration_m_per_s2: deceleration,
-        stopping_distance_m: braking + swing.map_or(0.0, |[_, length]| length),
+        stopping_distance_m: braking + swing.as_ref().map_or(0.0, |swing| swing.length_m),
         swing,
         impacts: contacts.iter().filter_map(impact).collect(),
         unknown_impacts: unknown.map(|contact| contact.object.clone()).collect(),

@@ -11,7 +11,7 @@ use tactflow_runtime::cli::clap::{self, ValueEnum};
 use tactflow_runtime::cli::{GraphArgs, Shell};
 use tactflow_runtime::graph::{Compiled, compile};
 
-use super::control::chain::{Limiter, chain};
+use super::control::chain::{Chain, Limiter, chain};
 use super::control::collect::law;
 use super::control::contacts::contacts;
 use super::control::law::Law;
@@ -133,7 +133,8 @@ fn motion_port<'a>(index: &Index<'a>, port: &'a str) -> Result<&'a str, String> 
             // A part exports the port of a node in it, often under its name.
             let (first, last) = port.split_once('.').unwrap_or((port, port));
             let is_inside = |name: &str| name.starts_with(&format!("{first}.")) && name.ends_with(&format!(".{last}"));
-            let inside = outputs.filter(|output| is_inside(&output.name)).last();
+            let moves = outputs.filter(|output| ["twist", "joints"].contains(&output.kind));
+            let inside = moves.filter(|output| is_inside(&output.name)).last();
             let help = inside.map(|output| format!(": did you mean `{}`?", output.name)).unwrap_or_default();
             Err(format!("no node writes `{port}`{help}"))
         }
@@ -152,11 +153,11 @@ fn arm_behind<'a>(index: &Index<'a>, port: &str) -> &'a str {
 /// has no contacts.
 fn motion(compiled: &Compiled, index: &Index<'_>, of: String, command: Command<'_>) -> Result<Motion, String> {
     let Command { arm, port } = command;
-    let (limits, twist) = chain(&Nodes::new(index, None), port)?;
+    let Chain { limits, turned, .. } = chain(&Nodes::new(index, None), port)?;
     let declared = contacts(compiled.facts(), arm)?;
     let modes = index.modes(index.task_of(port)).into_iter().map(|mode| {
         let nodes = Nodes::new(index, mode);
-        let law = law(&nodes, &twist);
+        let law = law(&nodes, &turned);
         Ok(ModeLaw {
             mode: mode.map(|mode| mode.name.clone()),
             loops: stability(&declared, &law),

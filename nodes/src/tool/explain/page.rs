@@ -5,7 +5,7 @@ use std::path::Path;
 
 use tactflow_runtime::cli::table;
 
-use super::approaches::Approach;
+use super::approaches::{Approach, Swing};
 use super::stability::{Play, Stability};
 use super::{Explained, ModeLaw, Motion};
 use crate::motion::COMPONENTS;
@@ -171,17 +171,13 @@ fn approach(approach: &Approach) -> String {
     let deceleration = number(approach.deceleration_m_per_s2);
     let most = if swing.is_some() { " at most" } else { "" };
     let swing = match swing {
-        Some([hz, length]) => {
-            format!("then {deceleration} m/s2, and a swing of {} mm at {} Hz", thousandths(*length), number(*hz))
+        Some(Swing { resonance_hz, length_m }) => {
+            format!(" and a swing of {} mm at {} Hz", thousandths(*length_m), number(*resonance_hz))
         }
-        None => {
-            format!(
-                "then {deceleration} m/s2. The bench states no resonance along x or y, so this leaves out how the arm swings on"
-            )
-        }
+        None => " without the swing of a compliant arm, of which the bench states no resonance along x or y".to_owned(),
     };
     let mut text = format!(
-        "From the {speed} mm/s of {from} a stop takes {distance} mm{most}: {reaction} ms until the arm follows, {swing}.\n"
+        "From the {speed} mm/s of {from} a stop takes {distance} mm{most}: {reaction} ms until the arm follows, then {deceleration} m/s2,{swing}.\n"
     );
     for impact in &approach.impacts {
         let [stiffness, resonance] = [impact.contact_n_per_m, impact.resonance_hz].map(number);

@@ -71,7 +71,10 @@ pub(super) fn stability(declared: &[Contact], law: &Law) -> Vec<Stability> {
             feature: feature.name.clone(),
             by_geometry: feature.quantity().is_some_and(|quantity| contact.is_by_geometry(quantity)),
             is_unknown: feature.schedules.iter().any(|schedule| schedule.nominal.is_none()),
-            play: margins.as_ref().and_then(|margins| Play::of(feature, contact, margins)),
+            play: margins
+                .as_ref()
+                .filter(|margins| margins.is_stable)
+                .and_then(|margins| Play::of(feature, contact, margins)),
             margins,
         }
     };

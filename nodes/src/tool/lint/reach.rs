@@ -79,7 +79,9 @@ pub(super) fn unreachable<'a>(arm: &Arm<'_>, mode: &ModeLaw<'a>, feature: &Featu
     }
     let (kind, keys, what) = LEAST_FELT.into_iter().find(|(of, ..)| *of == quantity).map(|(_, felt)| felt)?;
     let (threshold, node) = least_felt(mode, feature, kind, keys)?;
-    (setpoint <= threshold && !lets_go(arm, mode)).then_some(Unreachable::BelowThreshold { threshold, node, what })
+    // A tactel at the threshold counts, and the mean of several that are still there lies above it.
+    let is_below = setpoint < threshold || quantity == "pressure" && setpoint == threshold;
+    (is_below && !lets_go(arm, mode)).then_some(Unreachable::BelowThreshold { threshold, node, what })
 }
 
 /// Returns the warning about a setpoint of a force that the task never reaches.

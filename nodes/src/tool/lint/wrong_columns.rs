@@ -14,6 +14,8 @@ use crate::tool::control::contacts::Contact;
 use crate::tool::control::digits::to_three_digits;
 use crate::tool::control::law::Feature;
 
+/// Share of its largest answer from which on a feature answers a column [1].
+const MOST: f64 = 0.5;
 /// Largest radius of an object that a pad rolls on [m].
 const LARGEST_RADIUS: f64 = 0.1;
 
@@ -117,11 +119,17 @@ impl JudgedColumn<'_> {
                 > column[known.component].abs() * LARGEST_RADIUS
     }
 
-    /// Returns whether a contact of the bench states how the feature answers what moves.
+    /// Returns whether the bench states that the feature answers this column over each contact, and no other motion much
+    /// more.
     fn is_stated(&self) -> bool {
-        let answers = self.arm.contacts.iter().filter_map(|contact| contact.features.get(self.quantity));
-        let mut moved = answers.map(|answer| answer.along(&self.feature.column));
-        moved.any(|change| change != 0.0)
+        let largest = |row: &[f64; 6]| row.iter().fold(0.0_f64, |most, entry| most.max(entry.abs()));
+        let column = &self.feature.column;
+        let mut contacts = self.arm.contacts.iter().map(|contact| contact.features.get(self.quantity));
+        !self.arm.contacts.is_empty()
+            && contacts.all(|answer| {
+                let most = answer.map_or(f64::INFINITY, |answer| largest(&answer.row()));
+                answer.is_some_and(|answer| answer.along(column).abs() >= MOST * most * largest(column))
+            })
     }
 
     /// Returns the warning about a column of which the projectors leave only what does not change the feature.

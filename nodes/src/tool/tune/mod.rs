@@ -36,7 +36,7 @@ use tactflow_runtime::engine::Engine;
 use tactflow_runtime::graph::{Compiled, Request, compile};
 
 use super::arguments::{may_draw, write};
-use super::control::chain::{chain, smallest};
+use super::control::chain::{Chain, chain, smallest};
 use super::control::choose::Wanted;
 use super::control::collect::law;
 use super::control::contacts::Contact;
@@ -184,14 +184,14 @@ fn tune(args: &TuneArgs, shell: &Shell, request: &Request, compiled: Compiled) -
     cases::answers(&whole)?;
     let command = target::command(&whole, args.arm.as_deref())?;
     let index = Index::new(&whole);
-    let (_, twist) = chain(&Nodes::new(&index, None), command.port)?;
+    let Chain { twist, .. } = chain(&Nodes::new(&index, None), command.port)?;
     let task = target::task(&index, &twist, command.arm)?;
     let ranges = if task.file().is_none() { Range::all(&Engine::new(compiled)) } else { Vec::new() };
     let request = task.with(request, ranges.iter().flat_map(Range::opened));
     let outline = &task.outline(&whole);
     let command = target::command(outline, Some(command.arm))?;
     let index = Index::new(outline);
-    let (limits, twist) = chain(&Nodes::new(&index, None), command.port)?;
+    let Chain { limits, twist, .. } = chain(&Nodes::new(&index, None), command.port)?;
     let (mode, controlled) = controlled(args, &index, &twist)?;
     if args.save {
         save::is_possible(&whole, &task, mode, &controlled)?;

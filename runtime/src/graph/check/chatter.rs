@@ -44,7 +44,7 @@ pub(crate) fn check(
         let conditions: Vec<Condition> = ring.iter().map(|step| readings.origin(net, &step.exit.condition)).collect();
         let Some(cause) = cause(&conditions).filter(|cause| cause.is_fast(&ring, period)) else { continue };
         let is_reported = ring.iter().any(|step| ways.immediate(step.from, step.exit).is_some());
-        if !is_reported && cause.stays(net, contact, &ring) && marked.insert(back(&ring)) {
+        if !is_reported && cause.stays((net, contact), &ring, &conditions) && marked.insert(back(&ring)) {
             diagnostics.push(report(modes, &ring, help(&ring, &conditions, cause, period)));
         }
     }
@@ -116,12 +116,13 @@ impl Cause {
     }
 
     /// Returns whether no mode of a ring removes the cause: none changes the port that the ring watches.
-    fn stays(self, net: &Net<'_>, contact: &ContactPorts, ring: &[Step<'_>]) -> bool {
+    ///
+    /// `origins` are its conditions on what is measured.
+    fn stays(self, (net, contact): (&Net<'_>, &ContactPorts), ring: &[Step<'_>], origins: &[Condition]) -> bool {
+        let is_contact = |port: PortRef| contact.need(net, port) && is_raw(net, port);
+        let is_possible = self != Self::Contact || origins.iter().filter_map(Condition::port).all(is_contact);
         let mut ports = ring.iter().filter_map(|step| step.exit.condition.port());
-        ports.all(|port| {
-            let is_possible = self != Self::Contact || contact.need(net, port) && is_raw(net, port);
-            is_possible && ring.iter().all(|step| stays(net, ring[0].from, step.from, port))
-        })
+        is_possible && ports.all(|port| ring.iter().all(|step| stays(net, ring[0].from, step.from, port)))
     }
 }
 

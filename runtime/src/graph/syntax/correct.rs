@@ -135,9 +135,15 @@ pub(super) fn correct_block(table: &mut Table, names: &[String], reader: &mut Re
         }
     }
     correct_wires(table, names, reader);
-    // A wire has any name, and none is a fact.
-    let params = table.entries.iter_mut().filter(|(key, _)| key.name != "in");
-    params.for_each(|(_, value)| correct_facts(value, reader));
+    for (key, value) in &mut table.entries {
+        match &mut value.item {
+            // A wire has any name, so only what stands in it is corrected.
+            Item::Table(wires) if key.name == "in" => {
+                wires.entries.iter_mut().for_each(|(_, wire)| correct_facts(wire, reader));
+            }
+            _ => correct_facts(value, reader),
+        }
+    }
 }
 
 /// Corrects the key `in` of a block: it holds only ports of the given nodes, roles and parts.
