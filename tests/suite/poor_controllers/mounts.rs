@@ -11,6 +11,13 @@ const MOUNT: [&str; 4] = [
 ];
 /// Columns that are right behind it.
 const TURNED: [&str; 2] = ["columns.x = [1, 0, 0, 0, 0, 0]", "columns.y = [0, 1, 0, 0, 0, 0]"];
+/// The same for half a turn about x.
+const FLIPPED: [&str; 4] = [
+    "set nodes.mount.rpy=[3.14159265, 0, 0]",
+    "columns.y = [0, 1, 0, 0, 0, 0]",
+    "columns.pressure = [0, 0, -1, 0, 0, 0]",
+    "set modes.approach.set.reach.twist=[0, 0, -0.008, 0, 0, 0]",
+];
 /// The mount before the sum, behind it, and directly before the limits.
 const PLACES: [[&str; 2]; 3] = [
     ["set nodes.turned.in.twist=\"projector.twist\"", "set nodes.sum.in.touch=\"turned.twist\""],
@@ -48,6 +55,8 @@ pub(super) fn good_mounts() -> Vec<Variant> {
     let turned = PLACES.iter().map(|place| variant("hybrid", &[&MOUNT[..], place, &TURNED].concat()));
     let others = [
         variant("hybrid", &GUARD),
+        // Turned about x, so that the approach moves along -z before the mount.
+        variant("hybrid", &[&MOUNT[..], &PLACES[1], &FLIPPED].concat()),
         variant("hybrid", &[EXCHANGED, "columns.x = [0, -1, 0, 0, 0, 0]", "columns.y = [1, 0, 0, 0, 0, 0]"]),
     ];
     turned.chain(others).collect()

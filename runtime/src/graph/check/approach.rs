@@ -5,9 +5,10 @@ use std::ops::Range;
 use super::contact::ContactPorts;
 use super::generators::{Generators, Motions};
 use crate::graph::net::Net;
-use crate::graph::plan::{Condition, PlannedExit, PlannedMode, Test};
+use crate::graph::plan::{Condition, PlannedExit, PlannedMode, Producer, Test};
 use crate::graph::syntax::{ExitKind, PortState};
-use crate::node::Motion;
+use crate::node::{Limits, Motion};
+use crate::signal::Kind;
 use crate::source::{Code, Diagnostic, Diagnostics, Value, quoted};
 
 /// Warns of each mode that waits for a contact and in which the sensor moves away from the object, or not at all.
@@ -35,10 +36,26 @@ pub(crate) fn check(
         let is_meant_to_move = is_bounded || is_always_still || is_set();
         if moving.is_empty() && is_meant_to_move && !all.is_empty() && !motions.wakes(i) {
             diagnostics.push(report(net, i, &all, Some(is_always_still)));
-        } else if !moving.is_empty() && moving.iter().all(|node| motions.of(i, *node) == Motion::Retreat) {
+        } else if !moving.is_empty()
+            && moving.iter().all(|node| motions.of(i, *node) == Motion::Retreat && !may_be_turned(net, *node))
+        {
             diagnostics.push(report(net, i, moving, None));
         }
     }
+}
+
+/// Returns whether the motion of a node may have another direction when it reaches the arm: it crosses more than the one
+/// change of frame that leads from the sensor to the base of the arm.
+fn may_be_turned(net: &Net<'_>, generator: usize) -> bool {
+    let turns = |node: &usize| {
+        let passes = net.spec(*node).is_some_and(|spec| {
+            let Limits { through, holds, breaks, .. } = spec.limits;
+            through.is_some() && holds.is_empty() && breaks.is_empty()
+        });
+        let output = net.outputs(Producer::Node(*node)).and_then(|outputs| outputs.first());
+        passes && output.is_some_and(|port| port.kind == Kind::Twist) && net.upstream([*node])[generator]
+    };
+    (0..net.wires.len()).filter(turns).count() > 1
 }
 
 /// Returns for each mode whether it begins without a contact: at the start, after a contact is lost, or after such a
