@@ -274,9 +274,6 @@ pub(super) fn poor_sums() -> Vec<(&'static str, Variant)> {
         ("windup", variant("hybrid", &["gains.pressure = { kp = 0.4, ki = 0.08, within = 0.2 }"])),
         ("unusual-gain", variant("hybrid", &["gains.x = { kp = 0.0 }"])),
         ("chattering-modes", variant("force", &compared("set nodes.firm.above=2.0"))),
-        // The opposite of one flag leads back, and no other flag stands beside it.
-        ("chattering-modes", through("not")),
-        ("chattering-modes", through("any")),
         (
             "chattering-modes",
             variant(
@@ -373,6 +370,9 @@ pub(super) fn opposed() -> Vec<(&'static str, Variant)> {
 /// What only a second look at the modes, the nodes or `[live]` shows.
 pub(super) fn at_second_sight() -> Vec<(&'static str, Variant)> {
     vec![
+        // The opposite of one flag leads back, and no other flag stands beside it.
+        ("chattering-modes", through("not")),
+        ("chattering-modes", through("any")),
         // The line is turned to y, and longer than the pad.
         (
             "line-position",

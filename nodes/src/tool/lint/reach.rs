@@ -63,12 +63,19 @@ pub(super) enum Unreachable<'a> {
     },
 }
 
-/// For each feature that needs a contact of some size: the type of the node that drops smaller ones, the keys of its bound,
-/// and what it drops.
-const LEAST_FELT: [(&str, (&str, &[&str], &str)); 3] = [
-    ("pressure", ("binarize", &["release", "threshold"], "tactels")),
-    ("force", ("label", &["min_force"], "contacts")),
-    ("area", ("label", &["min_area"], "contacts")),
+/// What is dropped before a feature is measured.
+struct Dropped {
+    quantity: &'static str,
+    /// The type of the node that drops it, and the keys of its bound, of which the first one that is given counts.
+    kind: &'static str,
+    keys: &'static [&'static str],
+    what: &'static str,
+}
+
+const DROPPED: [Dropped; 3] = [
+    Dropped { quantity: "pressure", kind: "binarize", keys: &["release", "threshold"], what: "tactels" },
+    Dropped { quantity: "force", kind: "label", keys: &["min_force"], what: "contacts" },
+    Dropped { quantity: "area", kind: "label", keys: &["min_area"], what: "contacts" },
 ];
 
 /// Returns why a task never reaches the setpoint of a feature; `None` if it may reach it.
@@ -77,11 +84,11 @@ pub(super) fn unreachable<'a>(arm: &Arm<'_>, mode: &ModeLaw<'a>, feature: &Featu
     if let Some((most, key)) = arm.force_limit(mode, quantity).filter(|(most, _)| setpoint >= *most) {
         return Some(Unreachable::AboveLimit { most, key });
     }
-    let (kind, keys, what) = LEAST_FELT.into_iter().find(|(of, ..)| *of == quantity).map(|(_, felt)| felt)?;
-    let (threshold, node) = least_felt(mode, feature, kind, keys)?;
+    let dropped = DROPPED.iter().find(|dropped| dropped.quantity == quantity)?;
+    let (threshold, node) = least_felt(mode, feature, dropped)?;
     // A tactel at the threshold counts, and the mean of several that are still there lies above it.
     let is_below = setpoint < threshold || quantity == "pressure" && setpoint == threshold;
-    (is_below && !lets_go(arm, mode)).then_some(Unreachable::BelowThreshold { threshold, node, what })
+    (is_below && !lets_go(arm, mode)).then_some(Unreachable::BelowThreshold { threshold, node, what: dropped.what })
 }
 
 /// Returns the warning about a setpoint of a force that the task never reaches.
@@ -134,11 +141,10 @@ fn lets_go(arm: &Arm<'_>, mode: &ModeLaw<'_>) -> bool {
     mode.releases().next().is_some() || mode.lost().filter_map(Exit::to).any(|to| arm.leaves(to))
 }
 
-/// Returns the smallest value that a node of this type counts upstream of a feature, and the node. The first of the keys
-/// that is given says it.
-fn least_felt<'a>(mode: &ModeLaw<'a>, feature: &Feature, kind: &str, keys: &[&str]) -> Option<(f64, &'a str)> {
+/// Returns the smallest value that counts upstream of a feature, and the node that drops smaller ones.
+fn least_felt<'a>(mode: &ModeLaw<'a>, feature: &Feature, dropped: &Dropped) -> Option<(f64, &'a str)> {
     let nodes = mode.nodes.upstream(feature.measured.as_deref()?);
-    let node = nodes.into_iter().find(|node| node.kind.text == kind)?;
-    let value = keys.iter().find_map(|key| mode.nodes.number(node, key))?;
+    let node = nodes.into_iter().find(|node| node.kind.text == dropped.kind)?;
+    let value = dropped.keys.iter().find_map(|key| mode.nodes.number(node, key))?;
     Some((value, &node.name))
 }
