@@ -100,6 +100,7 @@ pub(super) fn never_reached() -> Vec<(&'static str, Variant)> {
             ),
         ),
         ("unreachable-setpoint", banded("edge", band("orientation", "{ inner = 0.5, outer = 1.6 }", "absent"))),
+        ("unusual-gain", variant("hybrid", &["gains.x = { kp = 0.0 }"])),
         ("unusual-gain", variant("rolling", &["gains.x = { kp = 2.0, limit = 0.0001 }"])),
         ("unusual-gain", variant("edge", &["gains.pressure = { kd = 0.05 }"])),
         ("unusual-gain", variant("hybrid", &["columns.x = [-0.001, 0, 0, 0, 0, 0]"])),
@@ -272,7 +273,6 @@ pub(super) fn poor_sums() -> Vec<(&'static str, Variant)> {
             variant("hybrid", &["set facts.arm.contacts=[{ object = \"ball\", presure = { vz = 3.5 } }]"]),
         ),
         ("windup", variant("hybrid", &["gains.pressure = { kp = 0.4, ki = 0.08, within = 0.2 }"])),
-        ("unusual-gain", variant("hybrid", &["gains.x = { kp = 0.0 }"])),
         ("chattering-modes", variant("force", &compared("set nodes.firm.above=2.0"))),
         (
             "chattering-modes",

@@ -133,8 +133,8 @@ fn motion_port<'a>(index: &Index<'a>, port: &'a str) -> Result<&'a str, String> 
             // A part exports the port of a node in it, often under its name.
             let (first, last) = port.split_once('.').unwrap_or((port, port));
             let is_inside = |name: &str| name.starts_with(&format!("{first}.")) && name.ends_with(&format!(".{last}"));
-            let moves = outputs.filter(|output| ["twist", "joints"].contains(&output.kind));
-            let inside = moves.filter(|output| is_inside(&output.name)).last();
+            let mut moves = outputs.filter(|output| ["twist", "joints"].contains(&output.kind));
+            let inside = moves.rfind(|output| is_inside(&output.name));
             let help = inside.map(|output| format!(": did you mean `{}`?", output.name)).unwrap_or_default();
             Err(format!("no node writes `{port}`{help}"))
         }
