@@ -19,10 +19,10 @@ const FLIPPED: [&str; 4] = [
     "set modes.approach.set.reach.twist=[0, 0, -0.008, 0, 0, 0]",
 ];
 /// The mount before the sum, behind it, and directly before the limits.
-const PLACES: [[&str; 2]; 3] = [
-    ["set nodes.turned.in.twist=\"projector.twist\"", "set nodes.sum.in.touch=\"turned.twist\""],
-    ["set nodes.turned.in.twist=\"sum.twist\"", "set nodes.damping.in.twist=\"turned.twist\""],
-    ["set nodes.turned.in.twist=\"damping.twist\"", "set parts.move.in.twist=\"turned.twist\""],
+const PLACES: [&[&str]; 3] = [
+    &["set nodes.turned.in.twist=\"projector.twist\"", "set nodes.sum.in.touch=\"turned.twist\""],
+    &["set nodes.turned.in.twist=\"sum.twist\"", "set nodes.damping.in.twist=\"turned.twist\""],
+    &["set nodes.turned.in.twist=\"damping.twist\"", "set parts.move.in.twist=\"turned.twist\""],
 ];
 /// A node between the features and the sum that passes on their motion.
 const GUARD: [&str; 6] = [
@@ -39,7 +39,7 @@ const EXCHANGED: &str =
 
 /// The motion of the features passes a mount that is turned by half a turn about z.
 pub(super) fn half_turn() -> Vec<&'static str> {
-    [&MOUNT[..], &PLACES[0]].concat()
+    [&MOUNT[..], PLACES[0]].concat()
 }
 
 pub(super) fn poor_mounts() -> Vec<(&'static str, Variant)> {
@@ -56,7 +56,7 @@ pub(super) fn good_mounts() -> Vec<Variant> {
     let others = [
         variant("hybrid", &GUARD),
         // Turned about x, so that the approach moves along -z before the mount.
-        variant("hybrid", &[&MOUNT[..], &PLACES[1], &FLIPPED].concat()),
+        variant("hybrid", &[&MOUNT[..], PLACES[1], &FLIPPED].concat()),
         variant("hybrid", &[EXCHANGED, "columns.x = [0, -1, 0, 0, 0, 0]", "columns.y = [1, 0, 0, 0, 0, 0]"]),
     ];
     turned.chain(others).collect()

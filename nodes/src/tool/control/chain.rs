@@ -2,7 +2,7 @@
 
 use serde::Serialize;
 
-use super::mount::still_pose;
+use super::mount::{Mount, mount};
 use super::nodes::{Nodes, source, toml};
 
 /// A node between the twist of a task and the command.
@@ -24,20 +24,18 @@ pub(crate) struct Chain {
     pub(crate) limits: Vec<Limiter>,
     /// The port of the twist before all of them.
     pub(crate) twist: String,
-    /// The port from which on the columns count: that of the last `adjoint` among these nodes that turns them, or `twist`.
-    pub(crate) turned: String,
+    /// Those of these nodes that turn the twist, from the arm back.
+    pub(crate) mounts: Vec<Mount>,
 }
 
 /// Returns the way to a port.
 pub(crate) fn chain(nodes: &Nodes<'_>, port: &str) -> Result<Chain, String> {
-    let (mut limits, mut port, mut turned) = (Vec::new(), port.to_owned(), None);
+    let (mut limits, mut port, mut mounts) = (Vec::new(), port.to_owned(), Vec::new());
     let writer = |port: &str| nodes.writer(port).ok_or_else(|| format!("no node writes `{port}`"));
     let mut node = writer(&port)?;
     while !MAKERS.contains(&node.kind.text.as_str()) {
         let Some(input) = ["velocity", "twist"].into_iter().find_map(|input| source(node, input)) else { break };
-        if turned.is_none() && still_pose(nodes, node).is_some() {
-            turned = Some(port.clone());
-        }
+        mounts.extend(mount(nodes, node));
         limits.push(Limiter {
             node: node.name.clone(),
             kind: node.kind.text.clone(),
@@ -50,8 +48,7 @@ pub(crate) fn chain(nodes: &Nodes<'_>, port: &str) -> Result<Chain, String> {
         }
     }
     limits.reverse();
-    let turned = turned.unwrap_or_else(|| port.clone());
-    Ok(Chain { limits, twist: port, turned })
+    Ok(Chain { limits, twist: port, mounts })
 }
 
 /// Returns the smallest value that the limiters have for a parameter.

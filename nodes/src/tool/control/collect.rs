@@ -2,11 +2,11 @@
 
 use nalgebra::{Matrix6, Vector6};
 use tactflow_runtime::graph::OutlinedBlock;
-use tactflow_runtime::signal::{Pose, Twist};
+use tactflow_runtime::signal::Twist;
 
 use super::filters::Filter;
 use super::law::{Constant, Feature, Guidance, Law, feature};
-use super::mount::still_pose;
+use super::mount::{Mount, mount};
 use super::nodes::{Nodes, source};
 use super::shape::Shape;
 use crate::motion::COMPONENTS;
@@ -51,10 +51,10 @@ impl Passage {
         Self { matrix: self.matrix * selected, ..self.clone() }
     }
 
-    /// Returns the way before the adjoint of a pose.
-    fn turned(&self, node: &str, pose: &Pose) -> Self {
+    /// Returns the way before a mount.
+    fn turned(&self, Mount { node, pose }: &Mount) -> Self {
         let columns: [Vector6<f64>; 6] = std::array::from_fn(|i| adjoint(pose, &Twist(Vector6::ith(i, 1.0))).0);
-        let mount = Some(node.to_owned());
+        let mount = Some(node.clone());
         Self { matrix: self.matrix * Matrix6::from_columns(&columns), mount, ..self.clone() }
     }
 
@@ -91,8 +91,14 @@ impl Passage {
 
 /// Returns what the twist of a port is made of.
 pub(crate) fn law(nodes: &Nodes<'_>, port: &str) -> Law {
+    law_behind(nodes, port, &[])
+}
+
+/// Returns what the twist of a port is made of behind these mounts, which are in the order from the arm back.
+pub(crate) fn law_behind(nodes: &Nodes<'_>, port: &str, mounts: &[Mount]) -> Law {
     let mut law = Law::default();
-    collect(nodes, port, &Passage::default(), &mut law, &mut Vec::new());
+    let passage = mounts.iter().fold(Passage::default(), |passage, mount| passage.turned(mount));
+    collect(nodes, port, &passage, &mut law, &mut Vec::new());
     law.features = merged(std::mem::take(&mut law.features));
     let alone = law.features.clone();
     for (i, feature) in law.features.iter_mut().enumerate() {
@@ -123,8 +129,8 @@ fn collect<'a>(nodes: &Nodes<'a>, port: &str, passage: &Passage, law: &mut Law, 
     let mut follow = |input: &str, passage: &Passage, law: &mut Law| {
         source(node, input).into_iter().for_each(|twist| collect(nodes, twist, passage, law, path));
     };
-    if let Some(pose) = still_pose(nodes, node) {
-        follow("twist", &passage.turned(&node.name, &pose), law);
+    if let Some(mount) = mount(nodes, node) {
+        follow("twist", &passage.turned(&mount), law);
         path.pop();
         return;
     }

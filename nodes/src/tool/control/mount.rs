@@ -6,9 +6,16 @@ use tactflow_runtime::signal::Pose;
 use super::nodes::{Nodes, source};
 use crate::motion::pose::pose_of;
 
-/// Returns the pose of an `adjoint`, if it does not change and leaves the frame what it is: the pad is mounted otherwise
-/// than the columns say. Into another frame, the columns stay those of the frame in which they are written.
-pub(crate) fn still_pose(nodes: &Nodes<'_>, node: &OutlinedBlock) -> Option<Pose> {
+/// An `adjoint` of a pose that does not change.
+pub(crate) struct Mount {
+    /// Its name.
+    pub(crate) node: String,
+    pub(crate) pose: Pose,
+}
+
+/// Returns an `adjoint` whose pose does not change, and that leaves the frame what it is: the pad is mounted otherwise than
+/// the columns say. Into another frame, the columns stay those of the frame in which they are written.
+pub(crate) fn mount(nodes: &Nodes<'_>, node: &OutlinedBlock) -> Option<Mount> {
     let adjoint = Some(node).filter(|node| node.kind.text == "adjoint")?;
     let twist = source(adjoint, "twist")?;
     let before = nodes.writer(twist)?.outputs.iter().find(|port| port.name == twist)?;
@@ -17,5 +24,5 @@ pub(crate) fn still_pose(nodes: &Nodes<'_>, node: &OutlinedBlock) -> Option<Pose
     }
     let pose = nodes.writer(source(adjoint, "pose")?).filter(|node| node.kind.text == "static_pose")?;
     let read = |key: &str| nodes.value(pose, key).map_or(Some([0.0; 3]), |value| value.value.read());
-    Some(Pose(pose_of(read("xyz")?, read("rpy")?)))
+    Some(Mount { node: node.name.clone(), pose: Pose(pose_of(read("xyz")?, read("rpy")?)) })
 }

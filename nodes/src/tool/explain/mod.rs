@@ -12,7 +12,7 @@ use tactflow_runtime::cli::{GraphArgs, Shell};
 use tactflow_runtime::graph::{Compiled, compile};
 
 use super::control::chain::{Chain, Limiter, chain};
-use super::control::collect::law;
+use super::control::collect::law_behind;
 use super::control::contacts::contacts;
 use super::control::law::Law;
 use super::control::nodes::{Command, Ends, Index, Nodes, commands, ends};
@@ -153,11 +153,11 @@ fn arm_behind<'a>(index: &Index<'a>, port: &str) -> &'a str {
 /// has no contacts.
 fn motion(compiled: &Compiled, index: &Index<'_>, of: String, command: Command<'_>) -> Result<Motion, String> {
     let Command { arm, port } = command;
-    let Chain { limits, turned, .. } = chain(&Nodes::new(index, None), port)?;
+    let Chain { limits, twist, mounts } = chain(&Nodes::new(index, None), port)?;
     let declared = contacts(compiled.facts(), arm)?;
     let modes = index.modes(index.task_of(port)).into_iter().map(|mode| {
         let nodes = Nodes::new(index, mode);
-        let law = law(&nodes, &turned);
+        let law = law_behind(&nodes, &twist, &mounts);
         Ok(ModeLaw {
             mode: mode.map(|mode| mode.name.clone()),
             loops: stability(&declared, &law),

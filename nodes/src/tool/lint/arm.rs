@@ -9,7 +9,7 @@ use tactflow_runtime::source::{Item, Table, Value};
 
 use super::mode_law::ModeLaw;
 use crate::tool::control::chain::{Chain, Limiter, chain};
-use crate::tool::control::collect::law;
+use crate::tool::control::collect::law_behind;
 use crate::tool::control::contacts::Contact;
 use crate::tool::control::filters::way;
 use crate::tool::control::law::Feature;
@@ -46,11 +46,11 @@ impl<'a> Arm<'a> {
         command: Command<'a>,
         contacts: Vec<Contact>,
     ) -> Option<Self> {
-        let Chain { limits, twist, turned } = chain(&Nodes::new(index, None), command.port).ok()?;
+        let Chain { limits, twist, mounts } = chain(&Nodes::new(index, None), command.port).ok()?;
         let task = index.task_of(command.port);
         let modes = index.modes(task).into_iter().map(|mode| {
             let nodes = Nodes::new(index, mode);
-            ModeLaw { mode, carried, nodes, law: law(&nodes, &turned) }
+            ModeLaw { mode, carried, nodes, law: law_behind(&nodes, &twist, &mounts) }
         });
         let modes = modes.collect();
         Some(Self { outline: index.outline(), name: command.arm, task, limits, twist, contacts, modes })
