@@ -47,6 +47,14 @@ pub(super) fn poor_mounts() -> Vec<(&'static str, Variant)> {
     let others = [
         variant("hybrid", &[&GUARD[..], &["columns.x = [1, 0, 0, 0, 20, 0]"]].concat()),
         variant("hybrid", &[EXCHANGED, "columns.x = [0, 1, 0, 0, 0, 0]", "columns.y = [1, 0, 0, 0, 0, 0]"]),
+        // A bench that states how far the contact sticks says nothing of an axis.
+        variant(
+            "hybrid",
+            &[
+                "set facts.arm.contacts=[{ object = \"ball\", x = { play = 0.001 } }]",
+                "columns.x = [0, -1, 0, 20, 0, 0]",
+            ],
+        ),
     ];
     turned.chain(others).map(|variant| ("wrong-column", variant)).collect()
 }

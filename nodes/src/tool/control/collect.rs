@@ -25,7 +25,8 @@ struct Passage {
     delays: Vec<Filter>,
 }
 
-/// Types that pass on the motion of the features, and bound it in no direction by a number of their own.
+/// Types that pass on the motion of the features. Limits that stand among the nodes of a task are not followed: what is
+/// computed from their input would not be what the arm does.
 const PASSED: [&str; 4] = ["pivot", "edge_guard", "arm_damping", "bumpless"];
 /// Largest share of a motion, beside its largest component, that counts as 0 [1].
 const REST: f64 = 1e-4;

@@ -35,9 +35,10 @@ pub(crate) struct Feature {
     /// By how much its control may grow in a second [unit of the feature per s²].
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(crate) rise: Option<f64>,
-    /// Largest control, and the error from which on the integral rests.
+    /// Largest control [unit of the feature per s].
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(crate) limit: Option<f64>,
+    /// Largest error that the integral counts [unit of the feature].
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(crate) within: Option<f64>,
     /// The port that is measured, before its filters.

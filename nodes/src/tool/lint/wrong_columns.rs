@@ -14,7 +14,7 @@ use crate::tool::control::contacts::Contact;
 use crate::tool::control::digits::to_three_digits;
 use crate::tool::control::law::Feature;
 
-/// Share of its largest answer from which on a feature answers a column [1].
+/// Part of its largest answer with which a feature answers a column at least, if the bench states that it does [1].
 const MOST: f64 = 0.5;
 /// Largest radius of an object that a pad rolls on [m].
 const LARGEST_RADIUS: f64 = 0.1;
@@ -124,12 +124,13 @@ impl JudgedColumn<'_> {
     fn is_stated(&self) -> bool {
         let largest = |row: &[f64; 6]| row.iter().fold(0.0_f64, |most, entry| most.max(entry.abs()));
         let column = &self.feature.column;
-        let mut contacts = self.arm.contacts.iter().map(|contact| contact.features.get(self.quantity));
-        !self.arm.contacts.is_empty()
-            && contacts.all(|answer| {
-                let most = answer.map_or(f64::INFINITY, |answer| largest(&answer.row()));
-                answer.is_some_and(|answer| answer.along(column).abs() >= MOST * most * largest(column))
+        let answers = |contact: &Contact| {
+            contact.features.get(self.quantity).is_some_and(|answer| {
+                let change = answer.along(column).abs();
+                change > 0.0 && change >= MOST * largest(&answer.row()) * largest(column)
             })
+        };
+        !self.arm.contacts.is_empty() && self.arm.contacts.iter().all(answers)
     }
 
     /// Returns the warning about a column of which the projectors leave only what does not change the feature.
