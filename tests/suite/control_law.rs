@@ -125,10 +125,44 @@ fn every_shipped_task_is_explained_for_a_person_and_for_a_page() {
         "`pid` lets the control of `x` grow by at most 0.25 m/s2",
         "`pid` integrates errors of `pressure` up to 0.02 only",
         "At rest: wx, wy, wz.",
+        "From a touch to the command: 2 ms for `x`, `y`; 70 ms for `pressure`.",
+        "From the command to the image of its effect: 8.3 ms for `x` over `ball`.",
         "`move.contact` (`contact_limit`)",
         "force_n = 15.0",
     ] {
         assert!(page.contains(text), "{text}: {page}");
+    }
+}
+
+#[test]
+fn the_latency_is_that_of_the_samples_the_filters_and_the_contact() {
+    let facts = "facts.arm.contacts=[{ object = \"pen\", latency_ms = 12.0, y = { vy = -1.0, latency_ms = 5.0 } }]";
+    let slow = "devices.bench.rate_hz=125";
+    let explained = explained(&["graphs/hybrid.toml", "--set", facts, "--set", slow]);
+    let modes = explained["motions"][0]["modes"].as_array().unwrap();
+    let of = |mode: &str| modes.iter().find(|one| one["mode"] == mode).unwrap()["latencies"].as_array().unwrap();
+    assert!(of("approach").is_empty(), "nothing is controlled");
+    // Half of a period of 8 ms, half of nine periods of the mean, and a low-pass of 50 ms.
+    for (found, (feature, to_command, to_image)) in
+        of("servo").iter().zip([("x", 0.004, 0.012), ("y", 0.004, 0.005), ("pressure", 0.09, 0.012)])
+    {
+        assert_eq!(found["feature"], feature);
+        let near = |value: &Value, wanted: f64| (value.as_f64().unwrap() - wanted).abs() < 1e-9;
+        assert!(
+            near(&found["to_command_s"], to_command) && near(&found["to_image"][0]["latency_s"], to_image),
+            "{found}"
+        );
+    }
+    assert_eq!(of("servo").len(), 3);
+}
+
+#[test]
+fn a_contact_that_cannot_be_read_is_marked_in_its_file() {
+    let bad = "facts.arm.contacts=[{ object = \"pen\", pressure = { vz = 17.0, resonance_hz = -5.0 } }]";
+    let said = say(&["explain", "graphs/force.toml", "--set", bad]);
+    assert_eq!(said.code, 2, "{}", said.out);
+    for text in ["warning[unusual-value]", "-5.0", "error: `contacts` in `[facts.arm]` of the bench: pen"] {
+        assert!(said.err.contains(text), "{text}: {}", said.err);
     }
 }
 

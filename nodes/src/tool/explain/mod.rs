@@ -1,6 +1,7 @@
 //! `tactflow explain`: what moves the arm in each mode, in numbers.
 
 mod approaches;
+mod latency;
 mod page;
 mod stability;
 
@@ -17,6 +18,7 @@ use super::control::contacts::contacts;
 use super::control::law::Law;
 use super::control::nodes::{Command, Ends, Index, Nodes, commands, ends};
 use approaches::{Approach, approaches};
+use latency::{Latency, latencies};
 use stability::{Stability, stability};
 
 /// Print what moves the arm in each mode: gains, limits and delays
@@ -81,6 +83,8 @@ struct ModeLaw {
     mode: Option<String>,
     #[serde(flatten)]
     law: Law,
+    /// How late the features move the arm.
+    latencies: Vec<Latency>,
     /// The loops of the features that are controlled, over each contact that the bench declares.
     loops: Vec<Stability>,
     /// The motions that meet an object.
@@ -92,6 +96,7 @@ struct ModeLaw {
 pub(super) fn run(args: ExplainArgs, shell: &Shell) -> Result<u8, u8> {
     let request = args.graph_args.request(args.graph.clone());
     let compiled = compile(shell.catalogue(), &request).map_err(|report| shell.reject(&report))?;
+    compiled.warnings().iter().for_each(|report| shell.show(report));
     let explained = explain(&compiled, args.port.as_deref()).map_err(|message| shell.refuse(message))?;
     match args.format {
         Format::Json => shell.say_json(&explained),
@@ -160,6 +165,7 @@ fn motion(compiled: &Compiled, index: &Index<'_>, of: String, command: Command<'
         let law = law_behind(&nodes, &twist, &mounts);
         Ok(ModeLaw {
             mode: mode.map(|mode| mode.name.clone()),
+            latencies: latencies(&declared, &law),
             loops: stability(&declared, &law),
             approaches: approaches(&nodes, &limits, &law, &declared),
             law,

@@ -7,7 +7,7 @@ use tactflow_runtime::cli::table;
 
 use super::approaches::{Approach, Swing};
 use super::stability::{Play, Stability};
-use super::{Explained, ModeLaw, Motion};
+use super::{Explained, ModeLaw, Motion, latency};
 use crate::motion::COMPONENTS;
 use crate::tool::control::digits::or_none;
 use crate::tool::control::law::Feature;
@@ -77,6 +77,7 @@ fn law(mode: &ModeLaw, style: &Style) -> String {
         text += &style.table(&[&[HEAD.map(str::to_owned)], &rows[..]].concat(), 1, 8);
         text += "Speeds in m/s and rad/s for an error of one unit (setpoint - measured), by kp.\n";
     }
+    text += &latency::text(&mode.latencies);
     let moving = || law.features.iter().filter(|one| one.moves());
     text += &moving().flat_map(|one| one.schedules.iter().map(|schedule| scheduled(one, schedule))).collect::<String>();
     text += &moving().filter_map(rising).collect::<String>();
