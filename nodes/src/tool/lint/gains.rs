@@ -162,9 +162,9 @@ fn windup(arm: &Arm<'_>, mode: &ModeLaw<'_>, feature: &Feature) -> Option<Diagno
     let name = &feature.name;
     let message = format!(
         "the integral of `{name}` grows at every error that occurs. At last it alone moves the sensor at full speed: it \
-         winds up while the object is far, and overshoots"
+         winds up while the contact sticks or the object moves, and overshoots"
     );
-    let within = if number("within").is_some() { "a smaller `within`" } else { "`within`" };
+    let (within, key) = if number("within").is_some() { ("a smaller `within`", "within") } else { ("`within`", "ki") };
     let help = format!("write {within} in the gains of `{name}`, about five times its noise");
-    Some(Diagnostic::new(Code::Windup, mode.place_of_gain(feature, "ki"), message).help(help))
+    Some(Diagnostic::new(Code::Windup, mode.place_of_gain(feature, key), message).help(help))
 }

@@ -109,7 +109,7 @@ impl Line<'_> {
 impl fmt::Display for Line<'_> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let [length, pad] = [self.length, self.pad].map(|length| (length * 1e3).round());
-        write!(f, "the {} of {length} mm, on a pad of {pad} mm", self.shape)
+        write!(f, "the {} of {length} mm, where the pad measures places over {pad} mm", self.shape)
     }
 }
 

@@ -249,7 +249,7 @@ pub(super) fn unmeasured(
         format!("Begin with `kp = {}`, as in the recipe of docs/control.md. ", down_to_two_digits(first))
     });
     Some(format!(
-        ". This number leaves out the arm, so the true one is smaller. {begin}The bench does not say how `{quantity}` answers: \
+        ". This number leaves out the arm, so the true one is smaller. {begin}The bench states neither a resonance nor a response of `{quantity}`: \
          `tactflow tune` measures it"
     ))
 }
