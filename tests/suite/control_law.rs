@@ -125,8 +125,8 @@ fn every_shipped_task_is_explained_for_a_person_and_for_a_page() {
         "`pid` lets the control of `x` grow by at most 0.25 m/s2",
         "`pid` integrates errors of `pressure` up to 0.02 only",
         "At rest: wx, wy, wz.",
-        "From a touch to the command: 2 ms for `x`, `y`; 70 ms for `pressure`.",
-        "From the command to the image of its effect: 8.3 ms for `x` over `ball`.",
+        "From a change of the contact to the command: 2 ms for `x`, `y`; 70 ms for `pressure`.",
+        "with the latency of the pad: as in the measured response for `x` over `ball`, `pressure` over `ball`.",
         "`move.contact` (`contact_limit`)",
         "force_n = 15.0",
     ] {
@@ -144,14 +144,14 @@ fn the_latency_is_that_of_the_samples_the_filters_and_the_contact() {
     assert!(of("approach").is_empty(), "nothing is controlled");
     // Half of a period of 8 ms, half of nine periods of the mean, and a low-pass of 50 ms.
     for (found, (feature, to_command, to_image)) in
-        of("servo").iter().zip([("x", 0.004, 0.012), ("y", 0.004, 0.005), ("pressure", 0.09, 0.012)])
+        of("servo").iter().zip([("x", 0.004, Some(0.012)), ("y", 0.004, Some(0.005)), ("pressure", 0.09, None)])
     {
         assert_eq!(found["feature"], feature);
         let near = |value: &Value, wanted: f64| (value.as_f64().unwrap() - wanted).abs() < 1e-9;
-        assert!(
-            near(&found["to_command_s"], to_command) && near(&found["to_image"][0]["latency_s"], to_image),
-            "{found}"
-        );
+        assert!(near(&found["to_command_s"], to_command), "{found}");
+        // The contact does not say how the pressure answers.
+        let image = &found["to_image"][0]["latency_s"];
+        assert!(to_image.map_or(image.is_null(), |wanted| near(image, wanted)), "{found}");
     }
     assert_eq!(of("servo").len(), 3);
 }

@@ -11,10 +11,10 @@ use crate::tool::control::law::{Feature, Law};
 #[derive(Debug, Serialize)]
 pub(super) struct Latency {
     pub(super) feature: String,
-    /// From a touch to the command: half of the time between two images on average, and the filters [s]. The latency of the
-    /// pad is not part of it.
+    /// From a change of the contact to the command: half of the time between two images on average, and the filters [s].
+    /// The latency of the pad is not part of it.
     pub(super) to_command_s: f64,
-    /// From the command to the image that shows its effect, over each contact that states it.
+    /// From the command to the image that shows its effect, over each contact that says how the feature answers.
     pub(super) to_image: Vec<ToImage>,
 }
 
@@ -22,15 +22,18 @@ pub(super) struct Latency {
 #[derive(Debug, Serialize)]
 pub(super) struct ToImage {
     pub(super) object: String,
-    pub(super) latency_s: f64,
+    /// `None` where a measured response contains it [s].
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(super) latency_s: Option<f64>,
 }
 
 /// Returns the latencies of the features that move the arm.
 pub(super) fn latencies(declared: &[Contact], law: &Law) -> Vec<Latency> {
     let over = |feature: &Feature, contact: &Contact| {
-        let own = feature.quantity().and_then(|quantity| contact.features.get(quantity)?.latency_ms);
-        let latency_s = 1e-3 * own.unwrap_or(contact.latency_ms);
-        (latency_s > 0.0).then(|| ToImage { object: contact.object.clone(), latency_s })
+        let answer = contact.answer(feature.quantity()?)?;
+        let stated = 1e-3 * answer.latency_ms.unwrap_or(contact.latency_ms);
+        let latency_s = Some(stated).filter(|_| answer.response.is_empty());
+        (latency_s != Some(0.0)).then(|| ToImage { object: contact.object.clone(), latency_s })
     };
     let moving = law.features.iter().filter(|feature| feature.moves());
     let latency = |feature: &Feature| Latency {
@@ -46,9 +49,10 @@ pub(super) fn text(latencies: &[Latency]) -> String {
     if latencies.is_empty() {
         return String::new();
     }
-    let to_command = grouped(latencies.iter().map(|one| (one.to_command_s, format!("`{}`", one.feature))));
+    let to_command = grouped(latencies.iter().map(|one| (Some(one.to_command_s), format!("`{}`", one.feature))));
     let mut text = format!(
-        "From a touch to the command: {to_command}. This is half of the time between two images, and the filters.\n"
+        "From a change of the contact to the command: {to_command}. This is half of the time between two images, and the \
+         filters.\n"
     );
     let of_object = |one: &Latency| {
         let at = |to: &ToImage| (to.latency_s, format!("`{}` over `{}`", one.feature, to.object));
@@ -56,21 +60,22 @@ pub(super) fn text(latencies: &[Latency]) -> String {
     };
     let to_image = grouped(latencies.iter().flat_map(of_object));
     if !to_image.is_empty() {
-        let _ = writeln!(text, "From the command to the image of its effect: {to_image}.");
+        let _ = writeln!(text, "From the command to the image of its effect, with the latency of the pad: {to_image}.");
     }
     text
 }
 
-/// Lists what has each latency, such as "2 ms for `x` and `y`, 70 ms for `pressure`".
-fn grouped(found: impl Iterator<Item = (f64, String)>) -> String {
+/// Lists what has each latency, such as "2 ms for `x`, `y`; 70 ms for `pressure`".
+fn grouped(found: impl Iterator<Item = (Option<f64>, String)>) -> String {
     let mut groups: Vec<(String, Vec<String>)> = Vec::new();
     for (seconds, name) in found {
-        let ms = format!("{:.1}", 1e3 * seconds).trim_end_matches(".0").to_owned();
-        match groups.iter_mut().find(|(other, _)| *other == ms) {
+        let ms = |seconds: f64| format!("{} ms", format!("{:.1}", 1e3 * seconds).trim_end_matches(".0"));
+        let time = seconds.map_or_else(|| "as in the measured response".to_owned(), ms);
+        match groups.iter_mut().find(|(other, _)| *other == time) {
             Some((_, names)) => names.push(name),
-            None => groups.push((ms, vec![name])),
+            None => groups.push((time, vec![name])),
         }
     }
-    let of_group = |(ms, names): &(String, Vec<String>)| format!("{ms} ms for {}", names.join(", "));
+    let of_group = |(time, names): &(String, Vec<String>)| format!("{time} for {}", names.join(", "));
     groups.iter().map(of_group).collect::<Vec<_>>().join("; ")
 }
