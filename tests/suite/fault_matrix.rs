@@ -23,10 +23,10 @@ fn a_task_withstands_faults_of_the_pad_the_commands_the_arm_and_the_object() {
     let cells = json["cells"].as_array().unwrap();
     let broken: Vec<&Value> = cells.iter().filter(|cell| cell["ok"] != true).collect();
     assert_eq!((said.code, said.err.as_str()), (0, ""), "{broken:#?}");
-    // The force is controlled at any place, so nothing slides.
+    // The force is controlled at any place, so nothing slides, and its press is too slow for any limit.
     let missing: Vec<&str> =
         json["missing"].as_array().unwrap().iter().filter_map(|one| one["phase"].as_str()).collect();
-    assert_eq!(missing, ["sliding"]);
+    assert_eq!(missing, ["sliding", "at a limit"]);
     assert_eq!(cells.len(), SMOKE.len() * PHASES.len());
     let fate = |fault: &str, phase: &str, attack: usize| {
         let cell = cells.iter().find(|cell| cell["fault"] == fault && cell["phase"] == phase).unwrap();
