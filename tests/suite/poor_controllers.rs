@@ -132,6 +132,17 @@ fn a_column_that_a_mode_sets_is_marked_where_it_stands() {
 }
 
 #[test]
+fn an_integral_that_a_mode_lets_wind_up_is_marked_at_the_bound_that_the_mode_sets() {
+    let changes =
+        ["set nodes.pid.gains.x={ kp = 2.0, ki = 0.5, within = 0.003 }", "set modes.servo.set.pid.gains.x.within=0.2"];
+    let shown = variant("hybrid", &changes).warnings().map(|report| report.render(false)).unwrap();
+    assert!(
+        shown.contains("1 | modes.servo.set.pid.gains.x.within=0.2\n  |                                    ^^^"),
+        "{shown}"
+    );
+}
+
+#[test]
 fn an_exit_that_waits_for_another_error_does_not_need_this_one() {
     let changes = |when: &str| {
         [
