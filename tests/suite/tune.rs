@@ -215,6 +215,19 @@ fn a_loop_that_loses_its_contact_is_measured_again_with_smaller_gains() {
 }
 
 #[test]
+fn gains_near_instability_do_not_run_again_beside_the_new_ones() {
+    let near = ["nodes.pid.gains.orientation.kp=24.0", "nodes.pid.gains.orientation.ki=24.0"];
+    let sets = near.into_iter().flat_map(|set| ["--set", set]);
+    let args: Vec<&str> = ["tune", "graphs/edge.toml", "--feature", "orientation"].into_iter().chain(sets).collect();
+    let said = say(&args);
+    assert_eq!(said.code, 0, "{}{}", said.out, said.err);
+    let line = "Over `edge`, the task does not run with the old gains: those of `orientation` (kp = 24) ";
+    assert!(said.out.contains(line), "{}", said.out);
+    let compared = said.out.lines().find(|line| line.contains("the error of `orientation` is")).unwrap();
+    assert!(compared.contains("with the new ones") && !compared.contains("old gains"), "{compared}");
+}
+
+#[test]
 fn a_task_that_does_not_reach_the_mode_is_run_once_and_says_why() {
     let said = say(&["tune", "graphs/force.toml", "--set", "devices.bench.objects=[]"]);
     assert_eq!(said.code, 1, "{}{}", said.out, said.err);

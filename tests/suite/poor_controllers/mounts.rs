@@ -44,7 +44,9 @@ pub(super) fn half_turn() -> Vec<&'static str> {
 
 pub(super) fn poor_mounts() -> Vec<(&'static str, Variant)> {
     let turned = PLACES.iter().map(|place| variant("hybrid", &[&MOUNT[..], place].concat()));
+    let quarter = "set nodes.mount.rpy=[0, 0, 1.5707963]";
     let others = [
+        variant("hybrid", &[&half_turn()[..], &[quarter]].concat()),
         variant("hybrid", &[&GUARD[..], &["columns.x = [1, 0, 0, 0, 20, 0]"]].concat()),
         variant("hybrid", &[EXCHANGED, "columns.x = [0, 1, 0, 0, 0, 0]", "columns.y = [1, 0, 0, 0, 0, 0]"]),
         // A bench that states how far the contact sticks says nothing of an axis.

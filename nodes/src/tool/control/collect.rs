@@ -6,7 +6,7 @@ use tactflow_runtime::signal::Twist;
 
 use super::filters::Filter;
 use super::law::{Constant, Feature, Guidance, Law, feature};
-use super::mount::{Mount, mount};
+use super::mount::{Mount, REST, Turn, mount, without_rest};
 use super::nodes::{Nodes, source};
 use super::shape::Shape;
 use crate::motion::COMPONENTS;
@@ -17,8 +17,8 @@ use crate::motion::adjoint::adjoint;
 struct Passage {
     /// What the projectors, and the adjoints of poses that do not change, make of a twist.
     matrix: Matrix6<f64>,
-    /// The last adjoint of a pose that does not change.
-    mount: Option<String>,
+    /// The adjoints of poses that do not change.
+    turn: Option<Turn>,
     gates: Vec<String>,
     /// Switches whose selection is not known, with the number of the side.
     sides: Vec<(String, usize)>,
@@ -28,22 +28,17 @@ struct Passage {
 /// Types that pass on the motion of the features. Limits that stand among the nodes of a task are not followed: what is
 /// computed from their input would not be what the arm does.
 const PASSED: [&str; 4] = ["pivot", "edge_guard", "arm_damping", "bumpless"];
-/// Largest share of a motion, beside its largest component, that counts as 0 [1].
-const REST: f64 = 1e-4;
 
 impl Default for Passage {
     fn default() -> Self {
-        Self { matrix: Matrix6::identity(), mount: None, gates: Vec::new(), sides: Vec::new(), delays: Vec::new() }
+        Self { matrix: Matrix6::identity(), turn: None, gates: Vec::new(), sides: Vec::new(), delays: Vec::new() }
     }
 }
 
 impl Passage {
     /// Returns what becomes of a twist.
     fn of(&self, twist: [f64; 6]) -> [f64; 6] {
-        let moved: [f64; 6] = (self.matrix * Vector6::from(twist)).into();
-        // A turn that is written with a few digits leaves a rest in the other components.
-        let most = [0, 3].map(|first| moved[first..first + 3].iter().fold(0.0_f64, |most, part| most.max(part.abs())));
-        std::array::from_fn(|i| if moved[i].abs() < REST * most[i / 3] { 0.0 } else { moved[i] })
+        without_rest((self.matrix * Vector6::from(twist)).into())
     }
 
     /// Returns the way before a node that passes these components.
@@ -55,8 +50,9 @@ impl Passage {
     /// Returns the way before a mount.
     fn turned(&self, Mount { node, pose }: &Mount) -> Self {
         let columns: [Vector6<f64>; 6] = std::array::from_fn(|i| adjoint(pose, &Twist(Vector6::ith(i, 1.0))).0);
-        let mount = Some(node.clone());
-        Self { matrix: self.matrix * Matrix6::from_columns(&columns), mount, ..self.clone() }
+        let (columns, before) = (Matrix6::from_columns(&columns), self.turn.as_ref().map(|turn| turn.matrix));
+        let turn = Turn { node: node.clone(), matrix: before.unwrap_or_else(Matrix6::identity) * columns };
+        Self { matrix: self.matrix * columns, turn: Some(turn), ..self.clone() }
     }
 
     /// Returns the components of the arm that a node behind it can move.
@@ -161,7 +157,7 @@ fn collect<'a>(nodes: &Nodes<'a>, port: &str, passage: &Passage, law: &mut Law, 
                 feature.gates.extend(passage.gates.iter().cloned());
                 feature.filters.extend(passage.delays.iter().cloned());
                 feature.sides.clone_from(&passage.sides);
-                feature.mount.clone_from(&passage.mount);
+                feature.turn.clone_from(&passage.turn);
                 feature
             }));
         }

@@ -6,6 +6,7 @@ use tactflow_runtime::graph::OutlinedBlock;
 use super::contacts::Contact;
 use super::digits::to_three_digits;
 use super::filters::{Filter, smoothing, way};
+use super::mount::Turn;
 use super::nodes::{Nodes, source};
 use super::schedule::Schedule;
 
@@ -64,9 +65,9 @@ pub(crate) struct Feature {
     /// The flags without which it moves nothing.
     #[serde(skip)]
     pub(crate) gates: Vec<String>,
-    /// The `adjoint` that turns its column.
+    /// What turns its column.
     #[serde(skip)]
-    pub(crate) mount: Option<String>,
+    pub(crate) turn: Option<Turn>,
     /// The switches that it passes, with the number of the side, where the selection is not known.
     #[serde(skip)]
     pub(crate) sides: Vec<(String, usize)>,
@@ -276,7 +277,7 @@ pub(super) fn feature<'a>(nodes: &Nodes<'a>, jacobian: &'a OutlinedBlock, name: 
     let measured = way.as_ref().map(|way| way.measured.clone());
     let spared_s = way.as_ref().map_or(0.0, |way| way.spared_s);
     let (filters, gates) = way.map(|way| (way.filters, way.gates)).unwrap_or_default();
-    let (sides, mount) = (Vec::new(), None);
+    let (sides, turn) = (Vec::new(), None);
     let [kp, ki, kd] = ["kp", "ki", "kd"].map(|which| number(which).unwrap_or(0.0));
     let [rise, limit, within] = ["rise", "limit", "within"].map(number);
     let compared = error.map(|error| error.name.clone());
@@ -298,7 +299,7 @@ pub(super) fn feature<'a>(nodes: &Nodes<'a>, jacobian: &'a OutlinedBlock, name: 
         filters,
         spared_s,
         gates,
-        mount,
+        turn,
         sides,
         schedules,
         name,

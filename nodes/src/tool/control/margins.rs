@@ -20,7 +20,7 @@ pub(crate) struct Margins {
     pub(crate) gain_db: Option<f64>,
     /// Largest factor by which the loop amplifies a disturbance: the maximum of |1 / (1 + L)| [1].
     pub(crate) peak_sensitivity: f64,
-    /// Frequency from which on the feature follows its setpoint by less than 71 % [Hz].
+    /// Lowest frequency at which the feature itself, before its filters, follows its setpoint by less than 71 % [Hz].
     pub(crate) bandwidth_hz: Option<f64>,
     /// Where the bandwidth lies if a feature follows by up to 15 % more or less than computed [Hz]: far apart where the
     /// feature follows by about 71 % over many frequencies.
@@ -88,6 +88,8 @@ pub(crate) fn rough_margins(around: &Loop) -> Margins {
 fn swept(around: &Loop, frequencies: usize) -> Margins {
     let top = PI / around.period;
     let open: Vec<(f64, Complex<f64>)> = sweep(top, frequencies).map(|omega| (omega, around.open(omega))).collect();
+    let followed: Vec<(f64, f64)> =
+        open.iter().map(|(omega, at)| (*omega, (around.ahead(*omega) / (Complex::from(1.0) + at)).norm())).collect();
     let crossings = crossings(&open);
     let one = Complex::from(1.0);
     let is_stable = !around.is_reversed() && is_stable(&open, around.integrators());
@@ -101,9 +103,9 @@ fn swept(around: &Loop, frequencies: usize) -> Margins {
             .filter(|db| !is_stable || *db > 0.0)
             .reduce(f64::min),
         peak_sensitivity: open.iter().map(|(_, at)| 1.0 / (one + at).norm()).fold(1.0, f64::max),
-        bandwidth_hz: last_passed(&open, HALF_POWER),
-        bandwidth_range_hz: first_missed(&open, HALF_POWER * (1.0 + UNSURE))
-            .zip(last_passed(&open, HALF_POWER * (1.0 - UNSURE)))
+        bandwidth_hz: first_missed(&followed, HALF_POWER),
+        bandwidth_range_hz: first_missed(&followed, HALF_POWER * (1.0 + UNSURE))
+            .zip(last_passed(&followed, HALF_POWER * (1.0 - UNSURE)))
             .map(Into::into),
         ramp_lag_s: around.ramp_lag(),
         integral_s: around.integral_s(),
@@ -154,26 +156,21 @@ fn is_stable(open: &[(f64, Complex<f64>)], integrators: usize) -> bool {
     angle.abs() < PI - ON_AXIS
 }
 
-/// Returns the share of a setpoint that the feature follows.
-fn followed(open: Complex<f64>) -> f64 {
-    (open / (Complex::from(1.0) + open)).norm()
+/// Returns the last frequency at which the feature follows at least so much of its setpoint [Hz].
+fn last_passed(followed: &[(f64, f64)], share: f64) -> Option<f64> {
+    let last = followed.iter().rposition(|(_, at)| *at >= share)?;
+    Some(followed[last].0 / (2.0 * PI))
 }
 
-/// Returns the last frequency at which the closed loop passes at least so much [Hz].
-fn last_passed(open: &[(f64, Complex<f64>)], share: f64) -> Option<f64> {
-    let last = open.iter().rposition(|(_, at)| followed(*at) >= share)?;
-    Some(open[last].0 / (2.0 * PI))
-}
-
-/// Returns the first frequency at which the closed loop passes less than so much [Hz].
-fn first_missed(open: &[(f64, Complex<f64>)], share: f64) -> Option<f64> {
-    let first = open.iter().position(|(_, at)| followed(*at) < share)?;
-    Some(open[first].0 / (2.0 * PI))
+/// Returns the first frequency at which the feature follows less than so much of its setpoint [Hz].
+fn first_missed(followed: &[(f64, f64)], share: f64) -> Option<f64> {
+    let first = followed.iter().position(|(_, at)| *at < share)?;
+    Some(followed[first].0 / (2.0 * PI))
 }
 
 /// Returns the standard deviation of the feature for white noise with one sample in each period [s].
 fn noise(open: &[(f64, Complex<f64>)], period: f64) -> f64 {
-    let power = |at: Complex<f64>| followed(at) * followed(at);
+    let power = |at: Complex<f64>| (at / (Complex::from(1.0) + at)).norm_sqr();
     let area = |pair: &[(f64, Complex<f64>)]| (power(pair[0].1) + power(pair[1].1)) / 2.0 * (pair[1].0 - pair[0].0);
     (open.windows(2).map(area).sum::<f64>() * period / PI).sqrt()
 }
@@ -181,7 +178,9 @@ fn noise(open: &[(f64, Complex<f64>)], period: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::super::contacts::Answer;
+    use super::super::filters::Filter;
     use super::super::law::Feature;
+    use super::super::shape::Shape;
     use super::*;
 
     /// The loop k / s, with a period that hardly counts, a delay [s] and a resonance.
@@ -254,6 +253,31 @@ mod tests {
         let found = integrator(share / 0.004, 0.0, 0.0, None, 0.004);
         near(Some(found.noise), (share / (2.0 - share)).sqrt(), 0.02);
         near(found.bandwidth_hz, share / 0.004 / (2.0 * PI), 0.03);
+    }
+
+    #[test]
+    fn a_bandwidth_is_that_of_the_feature_before_its_filters() {
+        let (k, time) = (4.0, 0.2);
+        let filter = |shape| Filter { node: String::new(), kind: String::new(), delay_s: 0.0, shape };
+        let feature = Feature {
+            name: "x".into(),
+            column: [-1.0, 0.0, 0.0, 0.0, 0.0, 0.0],
+            kp: k,
+            period_s: 1e-4,
+            filters: vec![filter(Shape::LowPass { time })],
+            ..Feature::default()
+        };
+        let answer = Answer { vx: Some(-1.0), ..Answer::default() };
+        let found = margins(&Loop::new(&feature, &answer, 0.0));
+        // k (1 + s T) / (T s^2 + s + k), and behind the filter k / (T s^2 + s + k).
+        let passes = |hz: f64, before: bool| {
+            let omega = 2.0 * PI * hz;
+            let ahead = if before { (omega * time).hypot(1.0) } else { 1.0 };
+            k * ahead / (k - time * omega * omega).hypot(omega)
+        };
+        let bandwidth = |before| (1..1000).map(|i| 0.005 * f64::from(i)).find(|hz| passes(*hz, before) < HALF_POWER);
+        near(found.bandwidth_hz, bandwidth(true).unwrap(), 0.01);
+        assert!(found.bandwidth_hz > bandwidth(false).map(|hz| 1.3 * hz), "{found:?}");
     }
 
     #[test]

@@ -1,5 +1,6 @@
 //! An `adjoint` that says how the pad is mounted.
 
+use nalgebra::{Matrix6, Vector6};
 use tactflow_runtime::graph::OutlinedBlock;
 use tactflow_runtime::signal::Pose;
 
@@ -11,6 +12,31 @@ pub(crate) struct Mount {
     /// Its name.
     pub(crate) node: String,
     pub(crate) pose: Pose,
+}
+
+/// What the mounts between a column and the arm make of it.
+#[derive(Debug, Clone)]
+pub(crate) struct Turn {
+    /// The `adjoint` that is nearest to the column.
+    pub(crate) node: String,
+    /// The adjoints of all poses.
+    pub(crate) matrix: Matrix6<f64>,
+}
+
+impl Turn {
+    /// Returns the column that has to be written so that this one reaches the arm.
+    pub(crate) fn written(&self, column: [f64; 6]) -> Option<[f64; 6]> {
+        Some(without_rest((self.matrix.try_inverse()? * Vector6::from(column)).into()))
+    }
+}
+
+/// Largest share of a motion, beside its largest component of the same unit, that counts as 0 [1].
+pub(super) const REST: f64 = 1e-4;
+
+/// Leaves out what a turn that is written with a few digits leaves in the other components of a twist.
+pub(super) fn without_rest(twist: [f64; 6]) -> [f64; 6] {
+    let most = [0, 3].map(|first| twist[first..first + 3].iter().fold(0.0_f64, |most, part| most.max(part.abs())));
+    std::array::from_fn(|i| if twist[i].abs() < REST * most[i / 3] { 0.0 } else { twist[i] })
 }
 
 /// Returns an `adjoint` whose pose does not change, and that leaves the frame what it is: the pad is mounted otherwise than

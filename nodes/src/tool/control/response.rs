@@ -131,9 +131,23 @@ impl Loop {
 
     /// Returns L at a circular frequency [rad/s].
     pub(crate) fn open(&self, omega: f64) -> Complex<f64> {
-        let model = self.known(omega) * self.modelled(omega) * self.gain;
-        let beside: Complex<f64> = self.beside.iter().map(|other| other.open(omega)).sum();
-        model * between(&self.measured, omega) + beside
+        self.all().map(|one| one.ahead_alone(omega) * one.filters(omega)).sum()
+    }
+
+    /// Returns the response from the error to the feature itself, before its filters, at a circular frequency [rad/s].
+    pub(crate) fn ahead(&self, omega: f64) -> Complex<f64> {
+        self.all().map(|one| one.ahead_alone(omega)).sum()
+    }
+
+    /// Returns it without the loops beside it.
+    fn ahead_alone(&self, omega: f64) -> Complex<f64> {
+        let arm = self.modelled(omega) * between(&self.measured, omega) * self.gain;
+        self.control(omega) * travel(omega, self.period) * arm
+    }
+
+    /// Returns the response of the filters.
+    fn filters(&self, omega: f64) -> Complex<f64> {
+        self.shapes.iter().map(|shape| shape.response(omega, self.period)).product()
     }
 
     /// Returns the response of arm and contact by resonance and latency, as a multiple of that to a slow motion.
@@ -143,8 +157,7 @@ impl Loop {
 
     /// Returns the response of controller, travel and filters, which a graph states.
     pub(crate) fn known(&self, omega: f64) -> Complex<f64> {
-        let filters: Complex<f64> = self.shapes.iter().map(|shape| shape.response(omega, self.period)).product();
-        self.control(omega) * filters * travel(omega, self.period)
+        self.control(omega) * self.filters(omega) * travel(omega, self.period)
     }
 
     fn control(&self, omega: f64) -> Complex<f64> {

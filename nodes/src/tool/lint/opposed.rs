@@ -15,7 +15,11 @@ pub(super) fn check(arm: &Arm<'_>) -> Diagnostics {
     for mode in &arm.modes {
         let contradiction = retreat(mode).or_else(|| held(mode)).or_else(|| push(arm, mode));
         found.extend(
-            contradiction.or_else(|| pressed(arm, mode)).or_else(|| dragged(arm, mode)).or_else(|| contended(mode)),
+            contradiction
+                .or_else(|| pressed(arm, mode))
+                .or_else(|| dragged(arm, mode))
+                .or_else(|| contended(mode))
+                .or_else(|| divided(mode)),
         );
     }
     found
@@ -211,6 +215,37 @@ fn contended(mode: &ModeLaw<'_>) -> Option<Diagnostic> {
     );
     let help = "leave `ki` to one of them";
     Some(Diagnostic::new(Code::OpposedMotion, mode.place_of_gain(other, "ki"), message).help(help))
+}
+
+/// Returns the warning about one measurement that is controlled toward two setpoints along one component: it rests between
+/// them.
+fn divided(mode: &ModeLaw<'_>) -> Option<Diagnostic> {
+    // An orientation has the same value after half a turn, and a deadband lets two bounds stand side by side.
+    let is_judged = |feature: &&Feature| {
+        let quantity = mode.quantity(feature);
+        feature.is_open_in_contact(&mode.nodes)
+            && quantity.is_some_and(|quantity| quantity != "orientation")
+            && mode.deadband(feature).is_none()
+            && feature.setpoint.is_some()
+    };
+    let all: Vec<&Feature> = mode.moving().filter(is_judged).collect();
+    let shared = |one: &Feature, other: &Feature| {
+        let is_divided = one.measured == other.measured && one.setpoint != other.setpoint;
+        (0..6).find(|i| is_divided && one.column[*i] * other.column[*i] > 0.0)
+    };
+    let pairs = all.iter().enumerate().flat_map(|(at, one)| all[at + 1..].iter().map(move |other| (one, other)));
+    let (one, other, i) = pairs.into_iter().find_map(|(one, other)| Some((one, other, shared(one, other)?)))?;
+    let [first, second] = [one, other].map(|feature| feature.setpoint.unwrap_or_default());
+    let message = format!(
+        "{}`{}` and `{}` both move `{}` by `{}`, one toward {first} and the other one toward {second}: it rests between them",
+        mode.prefix(),
+        one.name,
+        other.name,
+        COMPONENTS[i],
+        one.measured.as_deref().unwrap_or_default()
+    );
+    let help = format!("control it once: remove the gains of `{}`, or write the same setpoint for both", other.name);
+    Some(Diagnostic::new(Code::OpposedMotion, mode.place_of_setpoint(other)?, message).help(help))
 }
 
 fn deselect(i: usize) -> String {

@@ -66,14 +66,47 @@ fn reader(arm: &Arm<'_>, port: &str) -> Option<String> {
 
 /// Returns the flag that keeps a feature from moving the sensor in a mode, why, and what mends it if that is known.
 fn barred<'f>(arm: &Arm<'_>, mode: &ModeLaw<'_>, feature: &'f Feature) -> Option<(&'f str, String, Option<String>)> {
-    feature.gates.iter().find_map(|gate| match mode.nodes.is_set(gate) {
+    let exclusive = || {
+        let (one, other) = contradiction(mode, &feature.gates)?;
+        let mend = format!("remove one of the two gates of `{}`, or let both be open at the same time", feature.name);
+        Some((one, format!("and `{other}`, which is never set at the same time"), Some(mend)))
+    };
+    let closed = feature.gates.iter().find_map(|gate| match mode.nodes.is_set(gate) {
         Some(true) => None,
         Some(false) => Some((&**gate, "which is set in another mode only".to_owned(), None)),
         None if is_without_contact(mode, gate) => {
             Some((&**gate, "which is set without a contact only".to_owned(), None))
         }
         None => out_of_reach(arm, mode, gate).map(|(why, mend)| (&**gate, why, Some(mend))),
-    })
+    });
+    closed.or_else(exclusive)
+}
+
+/// Returns two flags of which one is always off, of those that a feature passes.
+fn contradiction<'f>(mode: &ModeLaw<'_>, gates: &'f [String]) -> Option<(&'f str, &'f str)> {
+    let pairs = gates.iter().enumerate().flat_map(|(at, one)| gates[at + 1..].iter().map(move |other| (one, other)));
+    let exclude = |one: &str, other: &str| is_opposite(mode, one, other) || is_opposite(mode, other, one);
+    pairs
+        .map(|(one, other)| (&**one, &**other))
+        .find(|(one, other)| exclude(one, other) || are_apart(mode, one, other) || are_apart(mode, other, one))
+}
+
+/// Returns whether a flag is the opposite of another one.
+fn is_opposite(mode: &ModeLaw<'_>, flag: &str, other: &str) -> bool {
+    let not = mode.nodes.writer(flag).filter(|node| node.kind.text == "not");
+    not.and_then(|not| source(not, "flag")) == Some(other)
+}
+
+/// Returns whether a flag is set above a value, and the other one below a smaller value of the same port, also with their
+/// hysteresis.
+fn are_apart(mode: &ModeLaw<'_>, high: &str, low: &str) -> bool {
+    let compare = |flag: &str, key: &str| {
+        let node = mode.nodes.writer(flag).filter(|node| node.kind.text == "compare")?;
+        let number = |key: &str| mode.nodes.number(node, key);
+        Some((source(node, "value")?, number(key)?, number("hysteresis").unwrap_or_default()))
+    };
+    let bounds = compare(high, "above").zip(compare(low, "below"));
+    bounds.is_some_and(|((one, above, up), (other, below, down))| one == other && above - up >= below + down)
 }
 
 /// Returns why a comparison never sets its flag, and what mends it: it needs a larger force than a limit allows.

@@ -43,9 +43,12 @@ fn thresholds(arm: &Arm<'_>, mode: &ModeLaw<'_>) -> Diagnostics {
     never.collect()
 }
 
+/// Share of a limit from which on noise and overshoot reach it at a setpoint [1].
+const NEAR: f64 = 0.95;
+
 /// Why a task never reaches the setpoint of a force.
 pub(super) enum Unreachable<'a> {
-    /// It is not below a limit.
+    /// It is not below a limit, or so near to it that noise and overshoot reach it.
     AboveLimit {
         /// The limit, in the unit of the setpoint.
         most: f64,
@@ -81,7 +84,7 @@ const DROPPED: [Dropped; 3] = [
 /// Returns why a task never reaches the setpoint of a feature; `None` if it may reach it.
 pub(super) fn unreachable<'a>(arm: &Arm<'_>, mode: &ModeLaw<'a>, feature: &Feature) -> Option<Unreachable<'a>> {
     let (quantity, setpoint) = (mode.quantity(feature)?, feature.setpoint?);
-    if let Some((most, key)) = arm.force_limit(mode, quantity).filter(|(most, _)| setpoint >= *most) {
+    if let Some((most, key)) = arm.force_limit(mode, quantity).filter(|(most, _)| setpoint >= NEAR * *most) {
         return Some(Unreachable::AboveLimit { most, key });
     }
     let dropped = DROPPED.iter().find(|dropped| dropped.quantity == quantity)?;
@@ -96,11 +99,10 @@ fn unreachable_setpoint(arm: &Arm<'_>, mode: &ModeLaw<'_>, feature: &Feature) ->
     let (name, setpoint) = (&feature.name, feature.setpoint?);
     let (message, help) = match unreachable(arm, mode, feature)? {
         Unreachable::AboveLimit { most, key } => {
-            let why = if mode.quantity(feature)? == "pressure" { "one tactel" } else { "the whole pad" };
+            let of = if mode.quantity(feature)? == "pressure" { "one tactel" } else { "the whole pad" };
+            let why = if setpoint >= most { "it is never reached" } else { "noise and overshoot reach the limit" };
             (
-                format!(
-                    "the setpoint of `{name}` is {setpoint}, but the limit `{key}` of {why} is {most}: it is never reached"
-                ),
+                format!("the setpoint of `{name}` is {setpoint}, but the limit `{key}` of {of} is {most}: {why}"),
                 format!("write a setpoint well below {most}, or raise `{key}` in [limits]"),
             )
         }

@@ -46,7 +46,7 @@ fn wrong(arm: &Arm<'_>, mode: &ModeLaw<'_>, feature: &Feature) -> Option<Diagnos
 /// Returns the column of a feature as it is written, before all projectors. Where a mount turns it, returns what
 /// reaches the arm.
 fn judged_column(mode: &ModeLaw<'_>, feature: &Feature) -> Option<[f64; 6]> {
-    if feature.mount.is_some() { Some(feature.column) } else { mode.column(feature) }
+    if feature.turn.is_some() { Some(feature.column) } else { mode.column(feature) }
 }
 
 /// A column, and what geometry says of its feature.
@@ -65,7 +65,7 @@ impl JudgedColumn<'_> {
     /// or that slides it more than it presses. With two such columns the contact circles around its setpoint, or runs
     /// away from it.
     fn aside(&self) -> Option<Diagnostic> {
-        let Self { feature, quantity, column, .. } = self;
+        let Self { feature, quantity, .. } = self;
         let answers = || self.arm.contacts.iter().filter_map(|contact| contact.features.get(*quantity));
         let is_aside = |Confusion { own, other }: &&Confusion| {
             // A bench that states an answer to the other component knows more.
@@ -73,18 +73,25 @@ impl JudgedColumn<'_> {
             !is_stated && feature.column[*other].abs() > feature.column[*own].abs()
         };
         let Confusion { own, other } = *self.geometry.confused.iter().find(is_aside)?;
-        let mut right = *column;
-        for Confusion { own, other } in self.geometry.confused {
-            let sign = self.geometry.sign(*own)?;
-            let size = if *own == 2 { column[*own].abs() } else { column[*own].hypot(column[*other]) };
-            (right[*own], right[*other]) = (sign * to_three_digits(size), 0.0);
-        }
+        let right = self.straightened()?;
         let message = format!(
             "the column of `{}` moves the sensor more with `{}`, which does not change `{quantity}`, than with `{}`, \
              which does",
             feature.name, COMPONENTS[other], COMPONENTS[own]
         );
         Some(replaced(self.mode, feature, message, right))
+    }
+
+    /// Returns the column that moves with the components of the feature alone, as much as this one moves with those beside
+    /// them too.
+    fn straightened(&self) -> Option<[f64; 6]> {
+        let mut right = self.column;
+        for Confusion { own, other } in self.geometry.confused {
+            let sign = self.geometry.sign(*own)?;
+            let size = if *own == 2 { right[*own].abs() } else { right[*own].hypot(right[*other]) };
+            (right[*own], right[*other]) = (sign * to_three_digits(size), 0.0);
+        }
+        Some(right)
     }
 
     /// Returns the warning about a column that increases the error of its feature, by geometry.
@@ -153,7 +160,7 @@ impl JudgedColumn<'_> {
     fn foreign(&self) -> Option<Diagnostic> {
         let Self { mode, feature, quantity, geometry, .. } = self;
         // Behind a mount, the columns that are written are others.
-        if let Some(other) = self.exchanged().filter(|_| feature.mount.is_none()) {
+        if let Some(other) = self.exchanged().filter(|_| feature.turn.is_none()) {
             return self.exchange(&other);
         }
         let message = format!(
@@ -161,6 +168,9 @@ impl JudgedColumn<'_> {
             feature.name,
             moved(&feature.column)
         );
+        if let Some(right) = self.straightened().filter(|right| feature.turn.is_some() && geometry.changes(right)) {
+            return Some(replaced(mode, feature, message, right));
+        }
         let help = format!("`{quantity}` answers to {}: write the entry there", geometry.components(" and "));
         let place = mode.place_of_column(feature);
         Some(Diagnostic::new(Code::WrongColumn, place, behind(feature) + &message).help(help))
@@ -259,23 +269,25 @@ fn offset(arm: &Arm<'_>, mode: &ModeLaw<'_>, feature: &Feature) -> Option<Diagno
 
 /// Returns the start of a message about a column that a mount turns.
 fn behind(feature: &Feature) -> String {
-    feature.mount.as_ref().map(|mount| format!("behind `{mount}`, ")).unwrap_or_default()
+    feature.turn.as_ref().map(|turn| format!("behind `{}`, ", turn.node)).unwrap_or_default()
 }
 
 /// Returns the warning about a column, with the right one as a fix.
 fn replaced(mode: &ModeLaw<'_>, feature: &Feature, message: String, right: [f64; 6]) -> Diagnostic {
     // A column that is written keeps its digits; one that is turned has as many as the pose leaves.
-    let right = if feature.mount.is_some() { right.map(to_three_digits) } else { right };
-    let (place, right) = (mode.place_of_column(feature), array(&right));
-    let diagnostic = Diagnostic::new(Code::WrongColumn, place.clone(), behind(feature) + &message);
-    match &feature.mount {
-        Some(mount) => diagnostic.help(format!(
-            "behind `{mount}`, the column must be {right}: turn the column that is written, or check the pose"
-        )),
-        None => {
-            diagnostic.help(format!("write `columns.{} = {right}`", feature.name)).edit(Edit::Replace(place, right))
-        }
-    }
+    let written = match &feature.turn {
+        Some(turn) => turn.written(right).unwrap_or(right).map(to_three_digits),
+        None => right,
+    };
+    let written = array(&written);
+    let place = mode.place_of_column(feature);
+    let why = feature
+        .turn
+        .as_ref()
+        .map_or_else(String::new, |turn| format!(", which `{}` turns, or check its pose", turn.node));
+    Diagnostic::new(Code::WrongColumn, place.clone(), behind(feature) + &message)
+        .help(format!("write `columns.{} = {written}`{why}", feature.name))
+        .edit(Edit::Replace(place, written))
 }
 
 /// Writes a column as TOML.

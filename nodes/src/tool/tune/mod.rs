@@ -217,9 +217,9 @@ fn tune(args: &TuneArgs, shell: &Shell, request: &Request, compiled: Compiled) -
     let ranges = ranges.iter().filter_map(|range| range.beyond(&features)).collect();
     let (name, settled) = (mode.name.clone(), Vec::new());
     let mut tuned = Tuned { task, mode: name, resting, arm, wanted, contacts, benches, features, ranges, settled };
-    for case in &cases {
+    for (i, case) in cases.iter().enumerate() {
         let trial = Trial::new(shell.catalogue(), &tuned.task, case, (mode, &adder));
-        tuned.settled.extend(compare(&trial, &tuned.features, &case.object)?);
+        tuned.settled.extend(compare(&trial, &tuned.features, (i, &case.object))?);
     }
     Ok(tuned)
 }

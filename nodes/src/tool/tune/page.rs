@@ -145,7 +145,12 @@ fn why_none(feature: &TunedFeature) -> String {
             .into();
     }
     if feature.is(Unknown::Lost) {
-        return "No gains are proposed: start with a gain at which the test signal does not end the mode.\n".into();
+        let tried: Vec<String> = feature.tried().iter().map(f64::to_string).collect();
+        return format!(
+            "No gains are proposed: the test signal has ended the mode with kp = {}. If the feature swings in `tactflow run`, \
+             start with a kp of less than the smallest of these. If a limit or a device has ended the mode, no gain helps.\n",
+            tried.join(", ")
+        );
     }
     let why = if climb::next(&[], feature.most).is_none() {
         "even a tenth of the gains of the graph is beyond the margins of what is known of the loop".to_owned()
@@ -196,6 +201,12 @@ fn gains(feature: &TunedFeature) -> String {
 
 fn settled(tuned: &Tuned) -> String {
     let mut text = String::new();
+    let mut left_out: Vec<(&str, &str)> =
+        tuned.settled.iter().filter_map(|one| Some((&*one.object, one.left_out.as_deref()?))).collect();
+    left_out.dedup();
+    for (object, why) in left_out {
+        let _ = writeln!(text, "Over `{object}`, the task does not run with the old gains: {why}.");
+    }
     for one in &tuned.settled {
         let feature = tuned.features.iter().find(|feature| feature.name == one.feature);
         let sized = |error: f64| match feature {
@@ -203,17 +214,23 @@ fn settled(tuned: &Tuned) -> String {
             None => to_three_digits(error).to_string(),
         };
         let error = |held: &Held| held.error.map_or_else(|| "unknown".into(), sized);
-        let (old, new) = (error(&one.old), error(&one.new));
+        let before =
+            |text: String| one.old.as_ref().map_or_else(String::new, |_| format!("{text} with the old gains and "));
+        let old = before(one.old.as_ref().map_or_else(String::new, error));
         let _ = write!(
             text,
-            "Over `{}`, the error of `{}` is {old} with the old gains and {new} with the new ones (rms)",
-            one.object, one.feature
+            "Over `{}`, the error of `{}` is {old}{} with the new ones (rms)",
+            one.object,
+            one.feature,
+            error(&one.new)
         );
         // One step over a contact that sticks is chance: the table has the mean of eight.
         let feature = feature.filter(|feature| feature.climbed.is_empty());
-        if let Some(((old, new), feature)) = one.old.step.zip(one.new.step).zip(feature) {
-            let (size, old, new) = (step::size(&feature.feature, new.size), followed(&old), followed(&new));
-            let _ = write!(text, ". A step of {size} {old} with the old gains, and {new} with the new ones");
+        let old_step = one.old.as_ref().map_or(Some(None), |old| old.step.map(Some));
+        if let Some(((old, new), feature)) = old_step.zip(one.new.step).zip(feature) {
+            let (size, new) = (step::size(&feature.feature, new.size), followed(&new));
+            let old = before(old.as_ref().map_or_else(String::new, followed));
+            let _ = write!(text, ". A step of {size} {old}{new} with the new ones");
         }
         match &one.failure {
             Some(why) => {

@@ -76,6 +76,12 @@ impl TunedFeature {
         self.answers.iter().any(|found| found.unknown == Some(unknown))
     }
 
+    /// Returns the proportional gains with which a test signal has ended the mode, if it always has.
+    pub(super) fn tried(&self) -> [f64; 3] {
+        let [(least, _), (more, _)] = SMALLER;
+        [HALF, more, least].map(|share| to_two_digits(share * self.old[0], libm::round))
+    }
+
     /// Returns whether noise or friction alone hide the responses that are not known.
     fn is_hidden(&self) -> bool {
         !self.is_measured() && !self.is(Unknown::Lost) && !self.is(Unknown::NotReached)
@@ -105,6 +111,17 @@ impl TunedFeature {
         self.margins = (0..self.answers.len()).map(|i| over(i).map(|(_, around)| margins(around))).collect();
     }
 
+    /// Returns why the task does not run again with the gains of the graph over a contact: they leave a gain margin that is
+    /// not larger than what a margin can be wrong by. `None` if they leave more, or if the response is not known.
+    pub(super) fn unsafe_as_it_was(&self, contact: usize) -> Option<String> {
+        let (_, around) = self.loops.iter().find(|(i, _)| *i == contact)?;
+        let found = margins(&around.times(1.0 / self.factor().unwrap_or(1.0)));
+        if !found.is_stable {
+            return Some("are unstable there".to_owned());
+        }
+        found.gain_db.filter(|db| *db < UNSURE_DB).map(|db| format!("have a gain margin of {db:.1} dB there"))
+    }
+
     /// Returns the proposed gains as a multiple of those of the graph.
     fn factor(&self) -> Option<f64> {
         self.new.map(|new| new[0] / self.old[0])
@@ -119,6 +136,8 @@ const ALIKE: RangeInclusive<f64> = 0.77..=1.3;
 const SLOWER: [f64; 2] = [0.4, 0.2];
 /// Shares of the gains of the graph with which a loop is measured again that loses its mode [1].
 const SMALLER: [(f64, &str); 2] = [(0.125, "an eighth of its gains"), (0.25, "a quarter of its gains")];
+/// By how much a gain margin can be too large [dB].
+const UNSURE_DB: f64 = 3.0;
 /// Share of the proposed gains with which it is measured again [1].
 const QUARTER: f64 = 0.25;
 

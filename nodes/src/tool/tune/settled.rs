@@ -13,8 +13,11 @@ use crate::tool::control::law::Feature;
 pub(super) struct Settled {
     pub(super) object: String,
     pub(super) feature: String,
-    /// With the old gains.
-    pub(super) old: Held,
+    /// With the old gains; `None` if the task did not run with them.
+    pub(super) old: Option<Held>,
+    /// Why it did not run with the old gains.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(super) left_out: Option<String>,
     /// With the new gains.
     pub(super) new: Held,
     /// Why the run with the new gains is no success.
@@ -39,15 +42,17 @@ impl Held {
         Self { error: deviation(seen.held.iter().copied()), step }
     }
 
-    /// Returns what is wrong with it, if it is worse than with the old gains.
-    fn failure(&self, old: &Self) -> Option<String> {
-        if let Some((new, old)) = self.step.zip(old.step) {
-            return new.failure(&old);
+    /// Returns what is wrong with it, if it is worse than with the old gains, or if nothing is known of those.
+    fn failure(&self, old: Option<&Self>) -> Option<String> {
+        if let Some(new) = self.step.filter(|_| old.is_none_or(|old| old.step.is_some())) {
+            return new.failure(old.and_then(|old| old.step).as_ref());
         }
+        let lost = "it is not held, or absent for a while".to_owned();
+        let Some(old) = old else { return self.error.is_none().then_some(lost) };
         let growth = self.error.zip(old.error).map(|(new, old)| new / old).filter(|growth| *growth > WORSE);
         let grows = growth.map(|growth| format!("the error grows to {growth:.1} times what it was"));
         let is_lost = old.step.is_some() || old.error.is_some() && self.error.is_none();
-        grows.or_else(|| is_lost.then(|| "it is not held, or absent for a while".to_owned()))
+        grows.or_else(|| is_lost.then_some(lost))
     }
 }
 
@@ -57,8 +62,13 @@ impl Settled {
     }
 }
 
-/// Runs the task with both gains, and compares how it holds each feature that has new ones.
-pub(super) fn compare(trial: &Trial<'_>, features: &[TunedFeature], object: &str) -> Result<Vec<Settled>, Stop> {
+/// Runs the task over a contact with both gains, and compares how it holds each feature that has new ones. Old gains that
+/// are near instability do not run again.
+pub(super) fn compare(
+    trial: &Trial<'_>,
+    features: &[TunedFeature],
+    (contact, object): (usize, &str),
+) -> Result<Vec<Settled>, Stop> {
     let changed: Vec<&TunedFeature> = features.iter().filter(|one| one.new.is_some()).collect();
     if changed.is_empty() {
         return Ok(Vec::new());
@@ -72,11 +82,17 @@ pub(super) fn compare(trial: &Trial<'_>, features: &[TunedFeature], object: &str
         let each = seen.iter().zip(&steps).map(|(seen, step)| Held::of(seen, *step, trial.outline.period_s));
         Ok((each.collect(), failure))
     };
-    let [(old, _), (new, failure)] = [held(&[])?, held(&new)?];
-    let each = changed.iter().zip(old.into_iter().zip(new));
-    let settled = each.map(|(one, (old, new))| {
-        let failure = failure.clone().or_else(|| new.failure(&old));
-        Settled { object: object.to_owned(), feature: one.name.clone(), old, new, failure }
+    let left_out = changed.iter().find_map(|one| {
+        let [kp, ..] = one.old;
+        Some(format!("those of `{}` (kp = {kp}) {}", one.name, one.unsafe_as_it_was(contact)?))
+    });
+    let old = if left_out.is_some() { None } else { Some(held(&[])?.0) };
+    let (new, failure) = held(&new)?;
+    let settled = changed.iter().zip(new).enumerate().map(|(i, (one, new))| {
+        let old = old.as_ref().map(|old| old[i]);
+        let failure = failure.clone().or_else(|| new.failure(old.as_ref()));
+        let (object, feature, left_out) = (object.to_owned(), one.name.clone(), left_out.clone());
+        Settled { object, feature, old, left_out, new, failure }
     });
     Ok(settled.collect())
 }

@@ -85,15 +85,15 @@ impl Step {
         })
     }
 
-    /// Returns what is wrong with a response that is worse than the old one.
-    pub(super) fn failure(&self, old: &Self) -> Option<String> {
+    /// Returns what is wrong with a response that is worse than the old one, if there is one.
+    pub(super) fn failure(&self, old: Option<&Self>) -> Option<String> {
         let percent = |share: f64| format!("{:.0} %", 100.0 * share);
-        let is_bad = |new: f64, old: f64, most: f64| new > most && new > WORSE * old;
-        if is_bad(self.overshoot, old.overshoot, MAX_OVERSHOOT) {
+        let is_bad =
+            |of: fn(&Self) -> f64, most: f64| of(self) > most && old.is_none_or(|old| of(self) > WORSE * of(old));
+        if is_bad(|step| step.overshoot, MAX_OVERSHOOT) {
             return Some(format!("after a step of the setpoint it overshoots by {}", percent(self.overshoot)));
         }
-        let is_restless = is_bad(self.rest, old.rest, MAX_REST);
-        is_restless.then(|| {
+        is_bad(|step| step.rest, MAX_REST).then(|| {
             format!("it does not settle after a step of the setpoint: the error is {} of the step", percent(self.rest))
         })
     }
@@ -228,7 +228,7 @@ mod tests {
             // It goes beyond the setpoint for long if it is damped little, which counts too.
             assert!(damping < 0.9 || (step.error_s - 2.0 * damping / 6.0).abs() < 0.03, "{damping}: {step:?}");
             assert!(step.rest < 0.01 && step.rise_s.unwrap() < 0.8, "{step:?}");
-            assert_eq!(step.failure(&Step { overshoot: 0.0, rest: 0.0, ..step }), None, "{step:?}");
+            assert_eq!(step.failure(Some(&Step { overshoot: 0.0, rest: 0.0, ..step })), None, "{step:?}");
         }
     }
 
@@ -237,9 +237,10 @@ mod tests {
         let good = Step::after_rest(2.0, &HELD, &errors(0.7), 0.004).unwrap();
         for (errors, why) in [(errors(0.0), "overshoots by"), (vec![2.0; 2000], "the error is 100 %")] {
             let step = Step::after_rest(2.0, &HELD, &errors, 0.004).unwrap();
-            let failure = step.failure(&good).unwrap();
+            let failure = step.failure(Some(&good)).unwrap();
             assert!(failure.contains(why), "{failure}");
-            assert_eq!(step.failure(&step), None);
+            assert_eq!(step.failure(None), Some(failure), "nothing is known of the old ones");
+            assert_eq!(step.failure(Some(&step)), None);
         }
     }
 

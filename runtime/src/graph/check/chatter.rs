@@ -12,7 +12,7 @@ use crate::signal::Kind;
 use crate::source::{Code, Diagnostic, Diagnostics, quoted};
 
 /// Number of modes of the longest ring that is looked for.
-const MAX_RING: usize = 3;
+const MAX_RING: usize = 4;
 /// A ring of modes that one value leads through chatters if it takes less than this [ns].
 const OVERLAP: i64 = 500_000_000;
 /// A ring of modes that only noise leads through chatters if it takes less than this [ns].
@@ -24,7 +24,7 @@ const MIN_GAP: f64 = 0.03;
 /// Part of a bound that is left as a gap to another bound, in the help [1].
 const GAP: f64 = 0.2;
 
-/// Warns of each ring of two or three modes that lead to each other, where a value that does not change, or one that
+/// Warns of each ring of two to four modes that lead to each other, where a value that does not change, or one that
 /// is at the bound, ends each of them.
 ///
 /// A mode that ends as soon as it begins has its own warning. `period` is that of the graph [s].
@@ -67,7 +67,7 @@ impl Step<'_> {
     }
 }
 
-/// Returns the rings of two modes, then those of three. Each begins with the first of its modes in the file.
+/// Returns the rings of modes, the shorter ones first. Each begins with the first of its modes in the file.
 fn rings(modes: &[PlannedMode]) -> Vec<Vec<Step<'_>>> {
     let mut rings = Vec::new();
     (0..modes.len()).for_each(|from| add_rings(modes, from, &mut Vec::new(), &mut rings));
@@ -213,8 +213,13 @@ fn help(ring: &[Step<'_>], conditions: &[Condition], cause: Cause, period: i64) 
             format!("let the way back wait for longer, for example `{key} = {time_ms}`")
         }
         (_, [_, back]) if is_flag(back) => {
-            "let the node that sets the flag leave a gap that is wider than the noise: `hysteresis` in a comparison"
-                .into()
+            let bound = bounds(0).map(|(min, max)| if min.is_finite() { min } else { max });
+            let example = bound.filter(|bound| bound.is_finite() && *bound != 0.0);
+            let example = example.map(|bound| format!(", for example `hysteresis = {}`", rounded(GAP * bound.abs())));
+            format!(
+                "let the node that sets the flag leave a gap that is wider than the noise: `hysteresis` in a comparison{}",
+                example.unwrap_or_default()
+            )
         }
         (_, [_, _]) => match bounds(0).zip(bounds(1)).and_then(|(there, back)| apart(there, back)) {
             Some(bound) => format!(
@@ -235,13 +240,17 @@ const fn is_flag(step: &Step<'_>) -> bool {
 /// Returns the bound on the way back that leaves a gap to the bounds on the way there.
 fn apart((min, max): (f64, f64), (low, high): (f64, f64)) -> Option<String> {
     let gap = |bound: f64| GAP * bound.abs();
-    let rounded = |bound: f64| (bound * 1e6).round() / 1e6;
     match (low.is_finite(), high.is_finite()) {
         (false, true) if min.is_finite() && min != 0.0 => Some(format!("`below = {}`", rounded(min - gap(min)))),
         (true, false) if max.is_finite() && max != 0.0 => Some(format!("`above = {}`", rounded(max + gap(max)))),
         (true, true) if min > 0.0 && low == -high => Some(format!("`within = {}`", rounded(min - gap(min)))),
         _ => None,
     }
+}
+
+/// Rounds a bound to six decimals.
+fn rounded(bound: f64) -> f64 {
+    (bound * 1e6).round() / 1e6
 }
 
 #[cfg(test)]
