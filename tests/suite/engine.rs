@@ -262,7 +262,9 @@ fn tune_tells_the_gain_at_which_a_loop_oscillates_on_a_physics_engine() {
     for (object, scene) in &OBJECTS[..2] {
         let peer = Peer::of("../oracles/engine.py", &format!("{scene} --again --seconds 100"));
         let address = format!("devices.bench.address=127.0.0.1:{}", peer.port);
-        let alone = ["--set", "nodes.schedule.min=1.0", "--set", "nodes.schedule.max=1.0"];
+        // Neither a schedule nor the limit of the press may hold back a swing.
+        let free = ["nodes.schedule.min=1.0", "nodes.schedule.max=1.0", "nodes.pid.gains.pressure.limit=1.0"];
+        let alone: Vec<&str> = free.into_iter().flat_map(|set| ["--set", set]).collect();
         let bench = ["graphs/force.toml", "--bench", "graphs/benches/lockstep.toml", "--set", &address];
         let args = [&bench[..], &alone].concat();
         let low = ["--set", "nodes.pid.gains.pressure.kp=0.25", "--set", "nodes.pid.gains.pressure.ki=0.04"];

@@ -15,6 +15,8 @@ use tactflow_runtime::graph::{Request, compile};
 use tactflow_runtime::source::Report;
 use tactflow_tests::{catalogue, toml_files, workspace};
 
+use crate::cli::in_new_folder;
+use crate::control_law::explained;
 use columns::{more_wrong_columns, wrong_columns};
 use good::{good, good_at_second_sight, good_behind_nodes, good_by_modes, good_by_turns};
 use mounts::{good_mounts, half_turn, poor_mounts};
@@ -129,7 +131,53 @@ fn the_help_states_the_column_that_has_to_be_written_before_the_mount() {
     let contact = "set facts.arm.contacts=[{ object = \"ball\", x = { vx = 1.0 } }]";
     let columns = ["columns.x = [1, 0, 0, 0, 0, 0]", "columns.y = [0, 1, 0, 0, 0, 0]"];
     let help = help("hybrid", &[&half_turn()[..], &columns, &[contact]].concat());
-    assert!(help.starts_with("write `columns.x = [-1, 0, 0, 0, 0, 0]`, which `turned` turns"), "{help}");
+    assert!(help.starts_with("write `columns.x = [-1, 0, 0, 0, 0, 0]`: `turned` turns it"), "{help}");
+}
+
+#[test]
+fn a_fix_before_a_mount_moves_the_arm_along_what_changes_the_feature_and_nothing_else() {
+    let quarter = "set nodes.mount.rpy=[0, 0, 1.5707963]";
+    let roll = ["columns.x = [-1, 0, 0, 0, -20, 0]", "columns.y = [0, -1, 0, 20, 0, 0]"];
+    let rolls = ["select = [1, 1, 1, 1, 1, 0]", "set nodes.mount.xyz=[0.05, 0.02, 0.03]", roll[0], roll[1]];
+    for (changes, right) in [
+        (&[][..], [("x", [-1.0, 0.0, 0.0, 0.0, 0.0, 0.0]), ("y", [0.0, -1.0, 0.0, 0.0, 0.0, 0.0])]),
+        (&[quarter], [("x", [-1.0, 0.0, 0.0, 0.0, 0.0, 0.0]), ("y", [0.0, -1.0, 0.0, 0.0, 0.0, 0.0])]),
+        (
+            &[quarter, rolls[0], rolls[1], rolls[2], rolls[3]],
+            [("x", [-1.0, 0.0, 0.0, 0.0, -20.0, 0.0]), ("y", [0.0, -1.0, 0.0, 20.0, 0.0, 0.0])],
+        ),
+        (&["set nodes.mount.rpy=[0, 1.0, 0]"], [("pressure", [0.0, 0.0, 1.0, 0.0, 0.0, 0.0]); 2]),
+    ] {
+        let poor = variant("hybrid", &[&half_turn()[..], changes].concat());
+        let text = fixed(&poor.warnings().unwrap(), &graph("hybrid")).unwrap();
+        let (_folder, path) = in_new_folder("hybrid.toml");
+        let shipped = workspace().join("graphs");
+        let text = ["parts/", "benches/", "robots/"].iter().fold(text, |text, folder| {
+            text.replace(&format!("\"{folder}"), &format!("\"{}/{folder}", shipped.display()))
+        });
+        std::fs::write(&path, text).unwrap();
+        let sets = poor.changes.iter().filter_map(|change| change.strip_prefix("set "));
+        let sets: Vec<&str> = sets.flat_map(|set| ["--set", set]).collect();
+        let page = explained(&[&[&*path], &sets[..]].concat());
+        let modes = page["motions"][0]["modes"].as_array().unwrap();
+        let servo = modes.iter().find(|mode| mode["mode"] == "servo").unwrap();
+        for (name, column) in right {
+            let features = servo["features"].as_array().unwrap();
+            let found = &features.iter().find(|feature| feature["name"] == name).unwrap()["column"];
+            let found: [f64; 6] = serde_json::from_value(found.clone()).unwrap();
+            let is_near =
+                found.iter().zip(column).all(|(found, wanted)| (found - wanted).abs() < 0.01 * wanted.abs().max(1.0));
+            assert!(is_near, "{changes:?}, {name}: {found:?}");
+        }
+    }
+}
+
+#[test]
+fn a_projector_before_a_mount_keeps_a_fix_away() {
+    let quarter = ["set nodes.mount.rpy=[0, 0, 1.5707963]", "select = [1, 0, 1, 0, 0, 0]"];
+    let report = variant("hybrid", &[&half_turn()[..], &quarter].concat()).warnings().unwrap();
+    let shown = report.render(false);
+    assert!(shown.contains("what the projectors before it select") && !shown.contains("write `columns."), "{shown}");
 }
 
 #[test]

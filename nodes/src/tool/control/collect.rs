@@ -38,7 +38,7 @@ impl Default for Passage {
 impl Passage {
     /// Returns what becomes of a twist.
     fn of(&self, twist: [f64; 6]) -> [f64; 6] {
-        without_rest((self.matrix * Vector6::from(twist)).into())
+        without_rest(twist, (self.matrix * Vector6::from(twist)).into())
     }
 
     /// Returns the way before a node that passes these components.
@@ -111,7 +111,10 @@ fn merged(features: Vec<Feature>) -> Vec<Feature> {
     for feature in features {
         let is_copy = |other: &&mut Feature| other.id() == feature.id() && other.takes_the_way_of(&feature);
         match merged.iter_mut().find(is_copy) {
-            Some(copy) => copy.column.iter_mut().zip(feature.column).for_each(|(sum, entry)| *sum += entry),
+            Some(copy) => {
+                copy.column.iter_mut().zip(feature.column).for_each(|(sum, entry)| *sum += entry);
+                copy.way += feature.way;
+            }
             None => merged.push(feature),
         }
     }
@@ -158,6 +161,7 @@ fn collect<'a>(nodes: &Nodes<'a>, port: &str, passage: &Passage, law: &mut Law, 
                 feature.filters.extend(passage.delays.iter().cloned());
                 feature.sides.clone_from(&passage.sides);
                 feature.turn.clone_from(&passage.turn);
+                feature.way = passage.matrix;
                 feature
             }));
         }

@@ -1,5 +1,6 @@
 //! The control law of a twist: what each component answers, and with which gain.
 
+use nalgebra::Matrix6;
 use serde::Serialize;
 use tactflow_runtime::graph::OutlinedBlock;
 
@@ -68,6 +69,9 @@ pub(crate) struct Feature {
     /// What turns its column.
     #[serde(skip)]
     pub(crate) turn: Option<Turn>,
+    /// What mounts and projectors make of the column that is written.
+    #[serde(skip)]
+    pub(crate) way: Matrix6<f64>,
     /// The switches that it passes, with the number of the side, where the selection is not known.
     #[serde(skip)]
     pub(crate) sides: Vec<(String, usize)>,
@@ -277,7 +281,7 @@ pub(super) fn feature<'a>(nodes: &Nodes<'a>, jacobian: &'a OutlinedBlock, name: 
     let measured = way.as_ref().map(|way| way.measured.clone());
     let spared_s = way.as_ref().map_or(0.0, |way| way.spared_s);
     let (filters, gates) = way.map(|way| (way.filters, way.gates)).unwrap_or_default();
-    let (sides, turn) = (Vec::new(), None);
+    let (sides, turn, way_of_column) = (Vec::new(), None, Matrix6::zeros());
     let [kp, ki, kd] = ["kp", "ki", "kd"].map(|which| number(which).unwrap_or(0.0));
     let [rise, limit, within] = ["rise", "limit", "within"].map(number);
     let compared = error.map(|error| error.name.clone());
@@ -300,6 +304,7 @@ pub(super) fn feature<'a>(nodes: &Nodes<'a>, jacobian: &'a OutlinedBlock, name: 
         spared_s,
         gates,
         turn,
+        way: way_of_column,
         sides,
         schedules,
         name,

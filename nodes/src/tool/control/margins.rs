@@ -105,7 +105,7 @@ fn swept(around: &Loop, frequencies: usize) -> Margins {
         peak_sensitivity: open.iter().map(|(_, at)| 1.0 / (one + at).norm()).fold(1.0, f64::max),
         bandwidth_hz: first_missed(&followed, HALF_POWER),
         bandwidth_range_hz: first_missed(&followed, HALF_POWER * (1.0 + UNSURE))
-            .zip(last_passed(&followed, HALF_POWER * (1.0 - UNSURE)))
+            .zip(first_missed(&followed, HALF_POWER * (1.0 - UNSURE)))
             .map(Into::into),
         ramp_lag_s: around.ramp_lag(),
         integral_s: around.integral_s(),
@@ -156,16 +156,11 @@ fn is_stable(open: &[(f64, Complex<f64>)], integrators: usize) -> bool {
     angle.abs() < PI - ON_AXIS
 }
 
-/// Returns the last frequency at which the feature follows at least so much of its setpoint [Hz].
-fn last_passed(followed: &[(f64, f64)], share: f64) -> Option<f64> {
-    let last = followed.iter().rposition(|(_, at)| *at >= share)?;
-    Some(followed[last].0 / (2.0 * PI))
-}
-
-/// Returns the first frequency at which the feature follows less than so much of its setpoint [Hz].
+/// Returns the first frequency at which the feature follows less than so much of its setpoint, half of the rate if there is
+/// none [Hz]; `None` if it hardly follows at all.
 fn first_missed(followed: &[(f64, f64)], share: f64) -> Option<f64> {
-    let first = followed.iter().position(|(_, at)| *at < share)?;
-    Some(followed[first].0 / (2.0 * PI))
+    let first = followed.iter().position(|(_, at)| *at < share).unwrap_or(followed.len() - 1);
+    (first > 0).then(|| followed[first].0 / (2.0 * PI))
 }
 
 /// Returns the standard deviation of the feature for white noise with one sample in each period [s].
@@ -292,6 +287,13 @@ mod tests {
         // A resonance of the arm lifts the response again where the loop has lost it.
         let flat = integrator(3.5, 0.0, 0.0, Some((2.2, 0.3)), 0.004);
         assert_eq!(flat.bandwidth(), "0.5-2.3 Hz", "{flat:?}");
+    }
+
+    #[test]
+    fn a_resonance_far_above_the_bandwidth_is_no_bandwidth() {
+        let found = integrator(3.0, 0.0, 0.0, Some((6.0, 0.08)), 0.004);
+        near(found.bandwidth_hz, 3.0 / (2.0 * PI), 0.1);
+        assert!(found.bandwidth().starts_with("0.4"), "{}", found.bandwidth());
     }
 
     #[test]

@@ -24,18 +24,19 @@ pub(crate) struct Turn {
 }
 
 impl Turn {
-    /// Returns the column that has to be written so that this one reaches the arm.
+    /// Returns the column that has to be written so that this one reaches the arm, if no projector keeps it away.
     pub(crate) fn written(&self, column: [f64; 6]) -> Option<[f64; 6]> {
-        Some(without_rest((self.matrix.try_inverse()? * Vector6::from(column)).into()))
+        Some(without_rest(column, (self.matrix.try_inverse()? * Vector6::from(column)).into()))
     }
 }
 
 /// Largest share of a motion, beside its largest component of the same unit, that counts as 0 [1].
 pub(super) const REST: f64 = 1e-4;
 
-/// Leaves out what a turn that is written with a few digits leaves in the other components of a twist.
-pub(super) fn without_rest(twist: [f64; 6]) -> [f64; 6] {
-    let most = [0, 3].map(|first| twist[first..first + 3].iter().fold(0.0_f64, |most, part| most.max(part.abs())));
+/// Leaves out what a turn that is written with a few digits leaves in the other components of a twist, of what it was.
+pub(super) fn without_rest(before: [f64; 6], twist: [f64; 6]) -> [f64; 6] {
+    let parts = |first: usize| before[first..first + 3].iter().chain(&twist[first..first + 3]);
+    let most = [0, 3].map(|first| parts(first).fold(0.0_f64, |most, part| most.max(part.abs())));
     std::array::from_fn(|i| if twist[i].abs() < REST * most[i / 3] { 0.0 } else { twist[i] })
 }
 

@@ -35,6 +35,8 @@ pub(crate) struct Loop {
     measured: Vec<(f64, Complex<f64>)>,
     /// Loops of the same measurement, or through the same motion, which add to this one.
     beside: Vec<Self>,
+    /// Whether its setpoint is that of the loop beside which it stands: both have the same measurement.
+    is_of_same: bool,
 }
 
 impl Loop {
@@ -60,7 +62,8 @@ impl Loop {
             if is_needed && around.is_none() {
                 return None;
             }
-            beside.extend(around);
+            let is_of_same = other.measured == feature.measured;
+            beside.extend(around.map(|around| Self { is_of_same, ..around }));
         }
         (around.gain != 0.0).then_some(Self { beside, ..around.times(factor) })
     }
@@ -71,7 +74,8 @@ impl Loop {
         let Feature { kp, ki, kd, period_s: period, .. } = *feature;
         let shapes = feature.filters.iter().map(|filter| filter.shape).collect();
         let (resonance, beside) = (answer.resonance(), Vec::new());
-        let around = Self { kp, ki, kd, shapes, gain, resonance, latency, period, measured: Vec::new(), beside };
+        let (measured, is_of_same) = (Vec::new(), true);
+        let around = Self { kp, ki, kd, shapes, gain, resonance, latency, period, measured, beside, is_of_same };
         let measured = answer.response.iter().map(|[hz, multiple, phase]| {
             let omega = 2.0 * std::f64::consts::PI * hz;
             (omega, turn(-phase.to_radians()) * *multiple / around.modelled(omega))
@@ -136,7 +140,7 @@ impl Loop {
 
     /// Returns the response from the error to the feature itself, before its filters, at a circular frequency [rad/s].
     pub(crate) fn ahead(&self, omega: f64) -> Complex<f64> {
-        self.all().map(|one| one.ahead_alone(omega)).sum()
+        self.all().filter(|one| one.is_of_same).map(|one| one.ahead_alone(omega)).sum()
     }
 
     /// Returns it without the loops beside it.

@@ -217,16 +217,20 @@ fn contended(mode: &ModeLaw<'_>) -> Option<Diagnostic> {
     Some(Diagnostic::new(Code::OpposedMotion, mode.place_of_gain(other, "ki"), message).help(help))
 }
 
-/// Returns the warning about one measurement that is controlled toward two setpoints along one component: it rests between
-/// them.
+/// Returns the warning about one measurement that is controlled toward two setpoints along one component.
 fn divided(mode: &ModeLaw<'_>) -> Option<Diagnostic> {
-    // An orientation has the same value after half a turn, and a deadband lets two bounds stand side by side.
+    // An orientation has the same value after half a turn, and with deadbands two bounds can stand side by side.
+    let has_band = |feature: &Feature| {
+        let width = |band| mode.nodes.number(band, &format!("width.{}.outer", feature.name));
+        mode.deadband(feature).and_then(width).is_some()
+    };
     let is_judged = |feature: &&Feature| {
         let quantity = mode.quantity(feature);
         feature.is_open_in_contact(&mode.nodes)
             && quantity.is_some_and(|quantity| quantity != "orientation")
-            && mode.deadband(feature).is_none()
+            && (feature.kp > 0.0 || feature.ki > 0.0)
             && feature.setpoint.is_some()
+            && !has_band(feature)
     };
     let all: Vec<&Feature> = mode.moving().filter(is_judged).collect();
     let shared = |one: &Feature, other: &Feature| {
@@ -235,16 +239,20 @@ fn divided(mode: &ModeLaw<'_>) -> Option<Diagnostic> {
     };
     let pairs = all.iter().enumerate().flat_map(|(at, one)| all[at + 1..].iter().map(move |other| (one, other)));
     let (one, other, i) = pairs.into_iter().find_map(|(one, other)| Some((one, other, shared(one, other)?)))?;
-    let [first, second] = [one, other].map(|feature| feature.setpoint.unwrap_or_default());
+    let [first, second] = [one, other].map(|feature| {
+        let setpoint = feature.setpoint.unwrap_or_default();
+        feature.unit().map_or_else(|| setpoint.to_string(), |_| feature.in_units(setpoint))
+    });
     let message = format!(
-        "{}`{}` and `{}` both move `{}` by `{}`, one toward {first} and the other one toward {second}: it rests between them",
+        "{}`{}` and `{}` both move `{}` by `{}`, one toward {first} and the other one toward {second}: it cannot rest at both",
         mode.prefix(),
         one.name,
         other.name,
         COMPONENTS[i],
         one.measured.as_deref().unwrap_or_default()
     );
-    let help = format!("control it once: remove the gains of `{}`, or write the same setpoint for both", other.name);
+    let nodes = [other.compared.as_deref()?, other.pid.as_deref()?, &*other.jacobian].map(|node| format!("`{node}`"));
+    let help = format!("write the same setpoint for both, or remove `{}` from {}", other.name, nodes.join(", "));
     Some(Diagnostic::new(Code::OpposedMotion, mode.place_of_setpoint(other)?, message).help(help))
 }
 

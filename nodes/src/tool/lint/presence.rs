@@ -68,8 +68,8 @@ fn reader(arm: &Arm<'_>, port: &str) -> Option<String> {
 fn barred<'f>(arm: &Arm<'_>, mode: &ModeLaw<'_>, feature: &'f Feature) -> Option<(&'f str, String, Option<String>)> {
     let exclusive = || {
         let (one, other) = contradiction(mode, &feature.gates)?;
-        let mend = format!("remove one of the two gates of `{}`, or let both be open at the same time", feature.name);
-        Some((one, format!("and `{other}`, which is never set at the same time"), Some(mend)))
+        let mend = format!("remove one of the two gates of `{}`, or change the bounds of what sets them", feature.name);
+        Some((one, format!("and at the same time `{other}`, but both are never set together"), Some(mend)))
     };
     let closed = feature.gates.iter().find_map(|gate| match mode.nodes.is_set(gate) {
         Some(true) => None,

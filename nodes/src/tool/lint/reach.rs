@@ -48,7 +48,7 @@ const NEAR: f64 = 0.95;
 
 /// Why a task never reaches the setpoint of a force.
 pub(super) enum Unreachable<'a> {
-    /// It is not below a limit, or so near to it that noise and overshoot reach it.
+    /// It is not below a limit.
     AboveLimit {
         /// The limit, in the unit of the setpoint.
         most: f64,
@@ -84,7 +84,7 @@ const DROPPED: [Dropped; 3] = [
 /// Returns why a task never reaches the setpoint of a feature; `None` if it may reach it.
 pub(super) fn unreachable<'a>(arm: &Arm<'_>, mode: &ModeLaw<'a>, feature: &Feature) -> Option<Unreachable<'a>> {
     let (quantity, setpoint) = (mode.quantity(feature)?, feature.setpoint?);
-    if let Some((most, key)) = arm.force_limit(mode, quantity).filter(|(most, _)| setpoint >= NEAR * *most) {
+    if let Some((most, key)) = arm.force_limit(mode, quantity).filter(|(most, _)| setpoint >= *most) {
         return Some(Unreachable::AboveLimit { most, key });
     }
     let dropped = DROPPED.iter().find(|dropped| dropped.quantity == quantity)?;
@@ -94,13 +94,24 @@ pub(super) fn unreachable<'a>(arm: &Arm<'_>, mode: &ModeLaw<'a>, feature: &Featu
     (is_below && !lets_go(arm, mode)).then_some(Unreachable::BelowThreshold { threshold, node, what: dropped.what })
 }
 
+/// Returns the limit that a setpoint nearly reaches, in a mode that does not end before.
+fn near_limit<'a>(arm: &Arm<'_>, mode: &ModeLaw<'a>, feature: &Feature) -> Option<Unreachable<'a>> {
+    let (quantity, setpoint) = (mode.quantity(feature)?, feature.setpoint?);
+    let (most, key) = arm.force_limit(mode, quantity)?;
+    let ends_before = mode.conditions().any(|exit| {
+        let is_of_it = exit.when().and_then(|when| arm.watched(mode, when)).as_deref() == Some(quantity);
+        is_of_it && exit.number("above").is_some_and(|above| above < NEAR * most)
+    });
+    (setpoint >= NEAR * most && !ends_before).then_some(Unreachable::AboveLimit { most, key })
+}
+
 /// Returns the warning about a setpoint of a force that the task never reaches.
 fn unreachable_setpoint(arm: &Arm<'_>, mode: &ModeLaw<'_>, feature: &Feature) -> Option<Diagnostic> {
     let (name, setpoint) = (&feature.name, feature.setpoint?);
-    let (message, help) = match unreachable(arm, mode, feature)? {
+    let (message, help) = match unreachable(arm, mode, feature).or_else(|| near_limit(arm, mode, feature))? {
         Unreachable::AboveLimit { most, key } => {
-            let of = if mode.quantity(feature)? == "pressure" { "one tactel" } else { "the whole pad" };
             let why = if setpoint >= most { "it is never reached" } else { "noise and overshoot reach the limit" };
+            let of = if mode.quantity(feature)? == "pressure" { "one tactel" } else { "the whole pad" };
             (
                 format!("the setpoint of `{name}` is {setpoint}, but the limit `{key}` of {of} is {most}: {why}"),
                 format!("write a setpoint well below {most}, or raise `{key}` in [limits]"),

@@ -2,6 +2,7 @@
 
 use std::f64::consts::FRAC_PI_2;
 
+use nalgebra::Vector6;
 use tactflow_runtime::source::{Code, Diagnostic, Diagnostics, Edit};
 
 use super::arm::Arm;
@@ -85,6 +86,9 @@ impl JudgedColumn<'_> {
     /// Returns the column that moves with the components of the feature alone, as much as this one moves with those beside
     /// them too.
     fn straightened(&self) -> Option<[f64; 6]> {
+        if self.feature.turn.is_some() {
+            return self.wanted();
+        }
         let mut right = self.column;
         for Confusion { own, other } in self.geometry.confused {
             let sign = self.geometry.sign(*own)?;
@@ -92,6 +96,15 @@ impl JudgedColumn<'_> {
             (right[*own], right[*other]) = (sign * to_three_digits(size), 0.0);
         }
         Some(right)
+    }
+
+    /// Returns the column that moves with the components of the feature alone, as far as the written one slides and turns.
+    fn wanted(&self) -> Option<[f64; 6]> {
+        let written = self.mode.column(self.feature)?;
+        let length = |first: usize| written[first].hypot(written[first + 1]).hypot(written[first + 2]);
+        let lengths = [0, 3].map(|first| to_three_digits(length(first)));
+        let sign = |i: usize| self.geometry.sign(i).unwrap_or_default();
+        Some(std::array::from_fn(|i| sign(i) * lengths[i / 3]))
     }
 
     /// Returns the warning about a column that increases the error of its feature, by geometry.
@@ -105,7 +118,7 @@ impl JudgedColumn<'_> {
         };
         let first = self.geometry.known.iter().find(is_reversed)?;
         // The entries that no projector selects get their signs too.
-        let right = self.geometry.signed(*column);
+        let right = if feature.turn.is_some() { self.wanted()? } else { self.geometry.signed(*column) };
         let message = format!(
             "the column of `{}` increases its error: `{}` is {}, but {}",
             feature.name,
@@ -168,7 +181,7 @@ impl JudgedColumn<'_> {
             feature.name,
             moved(&feature.column)
         );
-        if let Some(right) = self.straightened().filter(|right| feature.turn.is_some() && geometry.changes(right)) {
+        if let Some(right) = self.wanted().filter(|right| feature.turn.is_some() && geometry.changes(right)) {
             return Some(replaced(mode, feature, message, right));
         }
         let help = format!("`{quantity}` answers to {}: write the entry there", geometry.components(" and "));
@@ -272,22 +285,38 @@ fn behind(feature: &Feature) -> String {
     feature.turn.as_ref().map(|turn| format!("behind `{}`, ", turn.node)).unwrap_or_default()
 }
 
-/// Returns the warning about a column, with the right one as a fix.
+/// Returns the warning about a column, with the right one as a fix. Behind a mount, the right one is what has to reach the
+/// arm.
 fn replaced(mode: &ModeLaw<'_>, feature: &Feature, message: String, right: [f64; 6]) -> Diagnostic {
-    // A column that is written keeps its digits; one that is turned has as many as the pose leaves.
-    let written = match &feature.turn {
-        Some(turn) => turn.written(right).unwrap_or(right).map(to_three_digits),
-        None => right,
+    let (place, name) = (mode.place_of_column(feature), &feature.name);
+    let diagnostic = Diagnostic::new(Code::WrongColumn, place.clone(), behind(feature) + &message);
+    let Some(turn) = &feature.turn else {
+        let right = array(&right);
+        return diagnostic.help(format!("write `columns.{name} = {right}`")).edit(Edit::Replace(place, right));
     };
-    let written = array(&written);
-    let place = mode.place_of_column(feature);
-    let why = feature
-        .turn
-        .as_ref()
-        .map_or_else(String::new, |turn| format!(", which `{}` turns, or check its pose", turn.node));
-    Diagnostic::new(Code::WrongColumn, place.clone(), behind(feature) + &message)
-        .help(format!("write `columns.{} = {written}`{why}", feature.name))
-        .edit(Edit::Replace(place, written))
+    let written = turn.written(right).map(|column| column.map(to_three_digits));
+    let node = &turn.node;
+    match written.filter(|written| arrives(feature, *written, right)).as_ref().map(array) {
+        Some(written) => diagnostic
+            .help(format!("write `columns.{name} = {written}`: `{node}` turns it. Or check the pose that `{node}` reads"))
+            .edit(Edit::Replace(place, written)),
+        None => diagnostic.help(format!(
+            "behind `{node}`, the column must be {}: check the pose that `{node}` reads, and what the projectors before it select",
+            array(&right.map(to_three_digits))
+        )),
+    }
+}
+
+/// Difference of two columns that are the same, as a share of their largest entry of the same unit [1].
+const SAME: f64 = 5e-3;
+
+/// Returns whether a column, as it is written, moves the arm as wanted in all components that the projectors let pass.
+fn arrives(feature: &Feature, written: [f64; 6], wanted: [f64; 6]) -> bool {
+    let arrived = feature.way * Vector6::from(written);
+    let most = |i: usize| wanted[i / 3 * 3..i / 3 * 3 + 3].iter().fold(0.0_f64, |most, entry| most.max(entry.abs()));
+    let is_open = |i: usize| feature.way.row(i).iter().any(|entry| *entry != 0.0);
+    let is_same = |i: usize| (arrived[i] - wanted[i]).abs() <= SAME * most(i);
+    (0..6).all(|i| !is_open(i) || is_same(i)) && (0..6).any(|i| is_open(i) && wanted[i] != 0.0)
 }
 
 /// Writes a column as TOML.

@@ -145,11 +145,11 @@ fn why_none(feature: &TunedFeature) -> String {
             .into();
     }
     if feature.is(Unknown::Lost) {
-        let tried: Vec<String> = feature.tried().iter().map(f64::to_string).collect();
+        let [half, quarter, eighth] = feature.tried();
         return format!(
-            "No gains are proposed: the test signal has ended the mode with kp = {}. If the feature swings in `tactflow run`, \
-             start with a kp of less than the smallest of these. If a limit or a device has ended the mode, no gain helps.\n",
-            tried.join(", ")
+            "No gains are proposed: with kp = {half} the test signal has ended the mode, and with {quarter} and {eighth} nothing \
+             was measured either. If the feature swings in `tactflow run`, start with a kp below {eighth}. If a limit or a \
+             device has ended the mode, no gain helps.\n"
         );
     }
     let why = if climb::next(&[], feature.most).is_none() {
@@ -205,7 +205,7 @@ fn settled(tuned: &Tuned) -> String {
         tuned.settled.iter().filter_map(|one| Some((&*one.object, one.left_out.as_deref()?))).collect();
     left_out.dedup();
     for (object, why) in left_out {
-        let _ = writeln!(text, "Over `{object}`, the task does not run with the old gains: {why}.");
+        let _ = writeln!(text, "Over `{object}`, the old gains are not tried again: {why}.");
     }
     for one in &tuned.settled {
         let feature = tuned.features.iter().find(|feature| feature.name == one.feature);

@@ -76,7 +76,7 @@ impl TunedFeature {
         self.answers.iter().any(|found| found.unknown == Some(unknown))
     }
 
-    /// Returns the proportional gains with which a test signal has ended the mode, if it always has.
+    /// Returns the proportional gains with which a feature is measured that loses its mode, the largest one first.
     pub(super) fn tried(&self) -> [f64; 3] {
         let [(least, _), (more, _)] = SMALLER;
         [HALF, more, least].map(|share| to_two_digits(share * self.old[0], libm::round))
@@ -114,7 +114,7 @@ impl TunedFeature {
     /// Returns why the task does not run again with the gains of the graph over a contact: they leave a gain margin that is
     /// not larger than what a margin can be wrong by. `None` if they leave more, or if the response is not known.
     pub(super) fn unsafe_as_it_was(&self, contact: usize) -> Option<String> {
-        let (_, around) = self.loops.iter().find(|(i, _)| *i == contact)?;
+        let (_, around) = self.loops.iter().find(|(i, _)| *i == contact && self.answers[*i].refused.is_none())?;
         let found = margins(&around.times(1.0 / self.factor().unwrap_or(1.0)));
         if !found.is_stable {
             return Some("are unstable there".to_owned());

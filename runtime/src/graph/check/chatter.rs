@@ -214,10 +214,13 @@ fn help(ring: &[Step<'_>], conditions: &[Condition], cause: Cause, period: i64) 
         }
         (_, [_, back]) if is_flag(back) => {
             let bound = bounds(0).map(|(min, max)| if min.is_finite() { min } else { max });
-            let example = bound.filter(|bound| bound.is_finite() && *bound != 0.0);
+            // Of one flag that is set and cleared, the hysteresis is the gap.
+            let is_one = ring[0].exit.condition.port() == back.exit.condition.port();
+            let example = bound.filter(|bound| is_one && bound.is_finite() && *bound != 0.0);
             let example = example.map(|bound| format!(", for example `hysteresis = {}`", rounded(GAP * bound.abs())));
             format!(
-                "let the node that sets the flag leave a gap that is wider than the noise: `hysteresis` in a comparison{}",
+                "let the node that sets the flag leave a gap that is wider than the noise: `hysteresis` in a \
+                 comparison{}",
                 example.unwrap_or_default()
             )
         }
