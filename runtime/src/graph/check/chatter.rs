@@ -368,6 +368,12 @@ mod tests {
             found(vec![vec![leads(1), leads(2)], vec![leads(2)], vec![leads(0), leads(1)]]),
             [vec![0, 2], vec![1, 2], vec![0, 1, 2]]
         );
-        assert!(found(vec![vec![leads(0)], vec![leads(2)], vec![leads(3)], vec![leads(4)], vec![leads(1)]]).is_empty());
+        // Four modes that lead to each other, after one that leads to itself; and five, which are not looked for.
+        let ring = |last: usize| {
+            let others = (1..last).map(|from| vec![leads(from + 1)]);
+            [vec![leads(0)]].into_iter().chain(others).chain([vec![leads(1)]]).collect()
+        };
+        assert_eq!(found(ring(4)), [[1, 2, 3, 4]]);
+        assert!(found(ring(5)).is_empty());
     }
 }
