@@ -48,7 +48,7 @@ const NEAR: f64 = 0.95;
 
 /// Why a task never reaches the setpoint of a force.
 pub(super) enum Unreachable<'a> {
-    /// It is not below a limit.
+    /// It is not below a limit, or hardly.
     AboveLimit {
         /// The limit, in the unit of the setpoint.
         most: f64,
