@@ -27,6 +27,7 @@ pub const FILES: &[BuiltinFile] = &[
     ("programs/wave_pad.node.toml", include_bytes!("../python/examples/wave_pad.node.toml")),
     ("look.toml", include_bytes!("../../graphs/look.toml")),
     ("parts/touch.toml", include_bytes!("../../graphs/parts/touch.toml")),
+    ("parts/answer.toml", include_bytes!("../../graphs/parts/answer.toml")),
     ("parts/ruler.toml", include_bytes!("../../graphs/parts/ruler.toml")),
     ("parts/move.toml", include_bytes!("../../graphs/parts/move.toml")),
     ("parts/two_pad_move.toml", include_bytes!("../../graphs/parts/two_pad_move.toml")),

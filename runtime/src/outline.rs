@@ -47,10 +47,10 @@ pub struct Outline {
 pub struct OutlinedRange {
     /// Its full name: that of the node, and the path of the parameter in it, such as `pid.gains.x.kp`.
     pub name: String,
-    /// Its largest value, in its unit.
-    pub max: f64,
-    /// Where that is written.
-    pub span: Range<usize>,
+    /// Its smallest and its largest value, in its unit.
+    pub range: [f64; 2],
+    /// Where they are written.
+    pub spans: [Range<usize>; 2],
 }
 
 /// A word of a graph file.

@@ -1,10 +1,7 @@
 //! An arm whose stiffness is stated wrongly: `force` presses more slowly or harder, and then holds.
 
-use std::fs;
-
-use crate::cli::in_new_folder;
 use crate::control_law::recorded;
-use crate::tune::shipped;
+use crate::tune::force_with;
 
 /// What a run of `force` shows.
 struct Press {
@@ -17,12 +14,12 @@ struct Press {
 /// Runs `force` for 8 s with a stated stiffness of the joints, which are 200 N m/rad.
 fn pressed(bench: &str, stated: &str) -> Press {
     let bench = format!("graphs/benches/{bench}.toml");
-    let set = format!("nodes.spring.joint_n_m_per_rad={stated}");
+    let set = format!("parts.answer.set.spring.joint_n_m_per_rad={stated}");
     let rows = recorded(&["graphs/force.toml", "--bench", &bench, "--set", &set], "8s");
-    let touched = rows.iter().find(|row| row.contains_key("spring.deflection")).unwrap()["time"];
+    let touched = rows.iter().find(|row| row.contains_key("answer.spring.deflection")).unwrap()["time"];
     let mean = |from: f64, to: f64| {
         let after = rows.iter().filter(|row| (from..to).contains(&(row["time"] - touched)));
-        let each = after.filter_map(|row| Some(row.get("spring.deflection")? / row.get("touch.moments.force")?));
+        let each = after.filter_map(|row| Some(row.get("answer.spring.deflection")? / row.get("touch.moments.force")?));
         let each: Vec<f64> = each.collect();
         each.iter().sum::<f64>() / each.len() as f64
     };
@@ -48,11 +45,9 @@ fn a_stiffness_that_is_wrong_by_a_factor_of_two_is_corrected_in_contact() {
 
 #[test]
 fn an_arm_that_states_no_stiffness_is_not_damped() {
-    let (_folder, path) = in_new_folder("force.toml");
-    let text = shipped("force.toml");
+    let folder = tempfile::tempdir().unwrap();
     let states = "joint_n_m_per_rad = { from = \"arm.joint_n_m_per_rad\", optional = true }\n";
-    assert!(text.contains(states));
-    fs::write(&path, text.replace(states, "")).unwrap();
+    let path = force_with(folder.path(), states, "");
     let bench = "graphs/benches/ball.toml";
     let adds = |path: &str| {
         let rows = recorded(&[path, "--bench", bench], "3s");

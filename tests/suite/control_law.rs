@@ -36,7 +36,7 @@ pub(crate) fn explained(args: &[&str]) -> Value {
 
 /// The factor of a schedule on the control of a feature in a tick.
 fn factor(schedule: &Value, row: &BTreeMap<String, f64>) -> f64 {
-    let Some(ratio) = row.get("stiffness.ratio") else { return 1.0 };
+    let Some(ratio) = row.get("answer.stiffness.ratio") else { return 1.0 };
     let bound = |key: &str| schedule[key].as_f64().unwrap();
     (1.0 / ratio).clamp(bound("min"), bound("max"))
 }
@@ -221,6 +221,21 @@ fn margins_are_those_of_geometry_and_of_the_contacts_that_the_bench_states() {
     assert!((phase(&both[0]) - phase(&both[3]) - (3.3 * 0.02_f64).to_degrees()).abs() < 0.1);
     let page = say(&[&["explain"], &args[..]].concat()).out;
     assert!(page.contains("The worst loop is that of `pressure` over `"), "{page}");
+}
+
+#[test]
+fn a_place_that_rolls_over_an_unknown_radius_is_computed_without_it_and_explain_says_so() {
+    let page = |args: &[&str]| say(&[&["explain", "graphs/rolling.toml"], args].concat()).out;
+    let left_out = ["`x` over `ball` also rolls with `wy`, and the bench", "`y` over `ball` also rolls with `wx`"];
+    let unknown = page(&["--bench", "graphs/benches/ball.toml"]);
+    assert!(left_out.iter().all(|text| unknown.contains(text)), "{unknown}");
+    // What it says to write is what it then computes with.
+    assert!(unknown.contains("`wy = -0.05`") && unknown.contains("`wx = 0.05`"), "{unknown}");
+    let stated =
+        "facts.arm.contacts=[{ object = \"ball\", x = { vx = -1.0, wy = -0.05 }, y = { vy = -1.0, wx = 0.05 } }]";
+    for known in [page(&["--bench", "graphs/benches/ball.toml", "--set", stated]), page(&[])] {
+        assert!(!known.contains("also rolls") && known.contains("crossover"), "{known}");
+    }
 }
 
 #[test]

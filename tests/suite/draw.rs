@@ -79,7 +79,7 @@ fn every_shipped_graph_has_a_picture_with_all_its_nodes_and_wires() {
 #[test]
 fn a_wire_has_its_kind_unit_and_frames_and_a_part_has_a_frame() {
     let ([_, frames, _], texts) = read(&["graphs/hybrid.toml"]);
-    assert_eq!(frames, 3, "touch, move and ruler");
+    assert_eq!(frames, 4, "touch, answer, move and ruler");
     for text in
         ["image: image [raw] in pad", "control: features x y pressure in pad", "sensor_pose: pose in pad in arm.base"]
     {

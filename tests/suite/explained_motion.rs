@@ -268,7 +268,7 @@ fn the_estimate_of_a_run_is_near_what_the_bench_states() {
         let stated: toml::Table = toml::from_str(&fs::read_to_string(workspace().join(&file)).unwrap()).unwrap();
         let stated = stated["facts"]["arm"]["contacts"][0]["pressure"]["vz"].as_float().unwrap();
         let rows = recorded(&["graphs/force.toml", "--bench", &file], "6s");
-        let estimate = 10.0 * rows[rows.len() - 1]["stiffness.ratio"];
+        let estimate = 10.0 * rows[rows.len() - 1]["answer.stiffness.ratio"];
         assert!(
             off.contains(&(estimate / stated - 1.0)),
             "{bench}: {estimate}, stated {stated} N per tactel and metre"

@@ -3,6 +3,7 @@
 
 mod columns;
 mod good;
+mod live;
 mod mounts;
 mod pairs;
 mod poor;
@@ -19,6 +20,7 @@ use crate::cli::in_new_folder;
 use crate::control_law::explained;
 use columns::{more_wrong_columns, wrong_columns};
 use good::{good, good_at_second_sight, good_behind_nodes, good_by_modes, good_by_turns};
+use live::{good_by_others, poor_by_others};
 use mounts::{good_mounts, half_turn, poor_mounts};
 use pairs::{good_pairs, poor_pairs};
 use poor::{
@@ -54,6 +56,7 @@ fn each_poor_controller_gets_its_warning_and_no_other() {
         at_second_sight(),
         poor_filters_and_motions(),
         poor_pairs(),
+        poor_by_others(),
     ];
     let poor: Vec<_> = poor.into_iter().flatten().collect();
     assert!(poor.len() > 50, "{}", poor.len());
@@ -88,6 +91,7 @@ fn no_good_controller_is_blamed() {
         good_by_modes(),
         good_mounts(),
         good_pairs(),
+        good_by_others(),
     ]
     .into_iter()
     .flatten()
@@ -251,13 +255,13 @@ fn the_numbers_of_a_warning_are_those_of_explain() {
 
 #[test]
 fn a_schedule_that_makes_the_gains_larger_is_named_where_its_bound_stands() {
-    let factors = ["--set", "nodes.stiffness.nominal=150", "--set", "nodes.schedule.max=10"];
+    let factors = ["--set", "parts.answer.set.stiffness.nominal=150", "--set", "nodes.schedule.max=10"];
     let pen = ["check", "graphs/force.toml", "--bench", "graphs/benches/pen.toml"];
     let checked = crate::tool::say(&[&pen[..], &factors[..]].concat());
     let note = "note: `schedule` multiplies the gains by 10.0 over `pen`\n  --> command line:1:20\n";
     assert!(checked.err.contains("warning[low-margin]") && checked.err.contains(note), "{}", checked.err);
     // One that makes them smaller is no reason.
-    let gain = ["--set", "nodes.pid.gains.pressure.kp=4", "--set", "nodes.stiffness.nominal=5"];
+    let gain = ["--set", "nodes.pid.gains.pressure.kp=4", "--set", "parts.answer.set.stiffness.nominal=5"];
     let checked = crate::tool::say(&[&pen[..], &gain[..]].concat());
     assert!(checked.err.contains("warning[low-margin]") && !checked.err.contains("multiplies"), "{}", checked.err);
 }

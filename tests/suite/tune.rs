@@ -20,6 +20,18 @@ pub(crate) fn shipped(file: &str) -> String {
         .fold(text, |text, folder| text.replace(&format!("\"{folder}"), &format!("\"{}/{folder}", graphs.display())))
 }
 
+/// Writes a copy of `force` into a folder, with another text in its part `answer.toml`. Returns its path.
+pub(crate) fn force_with(folder: &Path, old: &str, new: &str) -> String {
+    let [answer, force] = ["parts/answer.toml", "force.toml"].map(shipped);
+    assert!(answer.contains(old), "{old}");
+    let part = folder.join("answer.toml");
+    fs::write(&part, answer.replace(old, new)).unwrap();
+    let used = tactflow_tests::workspace().join("graphs/parts/answer.toml");
+    let path = folder.join("force.toml");
+    fs::write(&path, force.replace(used.to_str().unwrap(), part.to_str().unwrap())).unwrap();
+    path.to_str().unwrap().to_owned()
+}
+
 #[test]
 fn a_slow_edge_gets_the_gain_that_was_found_by_hand_and_the_files_keep_their_comments() {
     let (_folder, path) = in_new_folder("edge.toml");
@@ -175,11 +187,10 @@ fn what_cannot_be_tuned_says_why() {
 #[test]
 fn gains_that_follow_the_measured_travel_are_named_and_not_tuned() {
     // Without the commanded travel, the factor says nothing of the loop.
-    let (_folder, path) = in_new_folder("force.toml");
-    let wires = "in.jacobian = \"move.jacobian\"\nin.equilibrium = \"arm.equilibrium\"\nin.deflection = \"spring.deflection\"\nnominal";
-    let text = shipped("force.toml");
-    assert!(text.contains(wires));
-    fs::write(&path, text.replace(wires, "nominal")).unwrap();
+    let folder = tempfile::tempdir().unwrap();
+    let equilibrium = "in.equilibrium = \"inputs.equilibrium\"\nin.deflection";
+    let wires = format!("in.jacobian = \"inputs.jacobian\"\n{equilibrium} = \"spring.deflection\"\nnominal");
+    let path = force_with(folder.path(), &wires, "nominal");
     assert_eq!(say(&["check", &path]).code, 0);
     let page = say(&["explain", &path]).out;
     assert!(page.contains("`schedule` multiplies the gains of `pressure` from 0.1 to 2, by what this"), "{page}");
@@ -188,8 +199,7 @@ fn gains_that_follow_the_measured_travel_are_named_and_not_tuned() {
     assert_eq!(said.code, 2, "{}", said.err);
     assert!(said.err.contains("`schedule` multiplies the gains of `pressure` by what is not known"), "{}", said.err);
     // One of both wires is a mistake in the place of the node.
-    fs::write(&path, text.replace("in.equilibrium = \"arm.equilibrium\"\nin.deflection", "in.deflection")).unwrap();
-    let said = say(&["check", &path]);
+    let said = say(&["check", &force_with(folder.path(), equilibrium, "in.deflection")]);
     assert!(said.code == 2 && said.err.contains("needs `equilibrium` beside `jacobian`"), "{}", said.err);
 }
 
@@ -200,6 +210,18 @@ fn a_contact_that_stiffens_counts_with_the_largest_motion() {
     let said = say(&["tune", "graphs/force.toml"].into_iter().chain(sets).collect::<Vec<_>>());
     assert_eq!(said.code, 0, "{}{}", said.out, said.err);
     assert!(said.out.contains("Over `ball`, the largest motion has an answer that is "), "{}", said.out);
+}
+
+#[test]
+fn a_test_signal_does_not_come_near_the_limit_of_the_force() {
+    // The box is held with 6.8 N, and this arm presses with 1 N more for each millimetre.
+    let limits = ["limits.force_n=11.0", "devices.bench.stiffness=800.0"].into_iter().flat_map(|set| ["--set", set]);
+    let box_of_toys = ["tune", "graphs/force.toml", "--bench", "graphs/benches/toy_box.toml"];
+    let said = say(&box_of_toys.into_iter().chain(limits).collect::<Vec<_>>());
+    assert_eq!(said.code, 0, "{}{}", said.out, said.err);
+    let signals = said.err.lines().filter_map(|line| line.split("a test signal of ").nth(1)?.strip_suffix(" m"));
+    let signals: Vec<f64> = signals.map(|amplitude| amplitude.parse().unwrap()).collect();
+    assert!(signals.len() > 1 && signals.iter().all(|amplitude| (0.0003..0.001).contains(amplitude)), "{signals:?}");
 }
 
 #[test]
@@ -240,10 +262,10 @@ fn a_task_that_does_not_reach_the_mode_is_run_once_and_says_why() {
 
 #[test]
 fn a_limit_that_acts_while_a_response_is_measured_is_named() {
-    let slow = ["tune", "graphs/force.toml", "--set", "limits.peak_n=0.27"];
+    let slow = ["tune", "graphs/edge.toml", "--feature", "orientation", "--set", "limits.angular_rad_per_s2=0.3"];
     let said = say(&slow);
-    assert!(said.out.contains("Over `ball`, `move.contact.peak` reduced the motion in "), "{}", said.out);
-    assert!(!say(&slow[..2]).out.contains("reduced the motion"));
+    assert!(said.out.contains("Over `edge`, `move.bumpless.bumpless` reduced the motion in "), "{}", said.out);
+    assert!(!say(&slow[..4]).out.contains("reduced the motion"));
 }
 
 #[test]

@@ -292,8 +292,12 @@ impl OutlineBuilder<'_> {
 }
 
 fn outlined_range(entry: &LiveEntry) -> OutlinedRange {
-    let Spanned { value: max, span } = entry.range.max.clone();
-    OutlinedRange { name: entry.name.value.clone(), max, span }
+    let ends = [&entry.range.min, &entry.range.max];
+    OutlinedRange {
+        name: entry.name.value.clone(),
+        range: ends.map(|end| end.value),
+        spans: ends.map(|end| end.span.clone()),
+    }
 }
 
 fn outlined_port(port: &PlannedPort) -> OutlinedPort {

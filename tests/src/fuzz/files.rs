@@ -177,6 +177,7 @@ pub(super) fn parts() -> Subject {
         of("parts/touch.toml", "force.toml"),
         of("parts/move.toml", "force.toml"),
         of("parts/ruler.toml", "force.toml"),
+        of("parts/answer.toml", "force.toml"),
         of("parts/carry_side.toml", "carry.toml"),
     ])
 }

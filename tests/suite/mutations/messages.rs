@@ -17,7 +17,7 @@ use crate::fixes;
 /// Graphs with a bench each, and the files that they read.
 const GRAPHS: [(&str, &[&str]); 6] = [
     ("finger_press.toml", &["finger_press.toml", "parts/touch.toml", "parts/move.toml", "benches/finger_press.toml"]),
-    ("hybrid.toml", &["hybrid.toml", "parts/ruler.toml", "benches/mock.toml"]),
+    ("hybrid.toml", &["hybrid.toml", "parts/ruler.toml", "parts/answer.toml", "benches/mock.toml"]),
     ("cable.toml", &["cable.toml", "benches/cable.toml"]),
     ("explore.toml", &["explore.toml", "benches/object.toml"]),
     ("seek_ridge.toml", &["seek_ridge.toml", "benches/ridge.toml"]),

@@ -24,6 +24,18 @@ const PLACES: [&[&str]; 3] = [
     &["set nodes.turned.in.twist=\"sum.twist\"", "set nodes.damping.in.twist=\"turned.twist\""],
     &["set nodes.turned.in.twist=\"damping.twist\"", "set parts.move.in.twist=\"turned.twist\""],
 ];
+/// The inverse of the pose of the mount, and twice this pose.
+const INVERSE: [&str; 3] = [
+    "set nodes.back.type=\"inverse_pose\"",
+    "set nodes.back.in.pose=\"mount.pose\"",
+    "set nodes.turned.in.pose=\"back.pose\"",
+];
+const TWICE: [&str; 4] = [
+    "set nodes.twice.type=\"compose_poses\"",
+    "set nodes.twice.in.outer=\"mount.pose\"",
+    "set nodes.twice.in.inner=\"mount.pose\"",
+    "set nodes.turned.in.pose=\"twice.pose\"",
+];
 /// A node between the features and the sum that passes on their motion.
 const GUARD: [&str; 6] = [
     "set nodes.guard.type=\"edge_guard\"",
@@ -47,6 +59,8 @@ pub(super) fn poor_mounts() -> Vec<(&'static str, Variant)> {
     let quarter = "set nodes.mount.rpy=[0, 0, 1.5707963]";
     let others = [
         variant("hybrid", &[&half_turn()[..], &[quarter]].concat()),
+        variant("hybrid", &[&half_turn()[..], &INVERSE].concat()),
+        variant("hybrid", &[&half_turn()[..], &[quarter], &TWICE].concat()),
         variant("hybrid", &[&GUARD[..], &["columns.x = [1, 0, 0, 0, 20, 0]"]].concat()),
         variant("hybrid", &[EXCHANGED, "columns.x = [0, 1, 0, 0, 0, 0]", "columns.y = [1, 0, 0, 0, 0, 0]"]),
         // A bench that states how far the contact sticks says nothing of an axis.
@@ -62,9 +76,12 @@ pub(super) fn poor_mounts() -> Vec<(&'static str, Variant)> {
 }
 
 pub(super) fn good_mounts() -> Vec<Variant> {
+    let quarter = "set nodes.mount.rpy=[0, 0, 1.5707963]";
     let turned = PLACES.iter().map(|place| variant("hybrid", &[&MOUNT[..], place, &TURNED].concat()));
     let others = [
         variant("hybrid", &GUARD),
+        variant("hybrid", &[&half_turn()[..], &INVERSE, &TURNED].concat()),
+        variant("hybrid", &[&half_turn()[..], &[quarter], &TWICE, &TURNED].concat()),
         // Turned about x, so that the approach moves along -z before the mount.
         variant("hybrid", &[&MOUNT[..], PLACES[1], &FLIPPED].concat()),
         variant("hybrid", &[EXCHANGED, "columns.x = [0, -1, 0, 0, 0, 0]", "columns.y = [1, 0, 0, 0, 0, 0]"]),

@@ -149,7 +149,7 @@ pub(super) fn poor_gains() -> Vec<(&'static str, Variant)> {
                 "two_arms",
                 &[
                     "set devices.right.rate_hz=25",
-                    "set parts.right.set.stiffness.lag_ms=200",
+                    "set parts.right.set.answer.stiffness.lag_ms=200",
                     "set parts.right.set.pid.gains.x.kp=40",
                     "set parts.right.set.pid.gains.x.rise=20",
                 ],

@@ -142,7 +142,7 @@ impl Gains {
             self.kp,
             (period * 1e6).round() / 1e3
         );
-        let help = format!("write less than {max:.0} 1/s, for example `kp = {}`", (max / 100.0).max(0.1));
+        let help = format!("write far less than {max:.0} 1/s, for example `kp = {}`", (max / 100.0).max(0.1));
         Some(warn(Code::UnstableGain, "kp", message)?.help(help))
     }
 }

@@ -49,7 +49,21 @@ pub(crate) fn mount(nodes: &Nodes<'_>, node: &OutlinedBlock) -> Option<Mount> {
     if before.frames != adjoint.outputs.first()?.frames {
         return None;
     }
-    let pose = nodes.writer(source(adjoint, "pose")?).filter(|node| node.kind.text == "static_pose")?;
-    let read = |key: &str| nodes.value(pose, key).map_or(Some([0.0; 3]), |value| value.value.read());
-    Some(Mount { node: node.name.clone(), pose: Pose(pose_of(read("xyz")?, read("rpy")?)) })
+    let pose = constant(nodes, source(adjoint, "pose")?)?;
+    Some(Mount { node: node.name.clone(), pose })
+}
+
+/// Returns the pose of a port, if static poses alone make it.
+fn constant(nodes: &Nodes<'_>, port: &str) -> Option<Pose> {
+    let node = nodes.writer(port)?;
+    let of = |input: &str| constant(nodes, source(node, input)?);
+    match node.kind.text.as_str() {
+        "static_pose" => {
+            let read = |key: &str| nodes.value(node, key).map_or(Some([0.0; 3]), |value| value.value.read());
+            Some(Pose(pose_of(read("xyz")?, read("rpy")?)))
+        }
+        "inverse_pose" => Some(Pose(of("pose")?.0.inverse())),
+        "compose_poses" => Some(Pose(of("outer")?.0 * of("inner")?.0)),
+        _ => None,
+    }
 }

@@ -240,6 +240,7 @@ fn loops(loops: &[Stability], style: &Style) -> String {
              `tactflow tune` measures this, unless friction hides it."
         );
     }
+    text += &loops.iter().filter_map(rolling).collect::<String>();
     text += &loops.iter().filter_map(sticking).collect::<String>();
     let found = loops.iter().filter_map(|one| Some((one, one.margins.as_ref()?)));
     let worst = found.max_by(|(_, a), (_, b)| {
@@ -259,6 +260,18 @@ fn loops(loops: &[Stability], style: &Style) -> String {
         );
     }
     text
+}
+
+/// Says that a loop is computed without its rolling.
+fn rolling(one: &Stability) -> Option<String> {
+    let component = one.left_out?;
+    let sign = if component == "wy" { "-" } else { "" };
+    Some(format!(
+        "{} also rolls with `{component}`, and the bench does not say how far the contact then moves: this part of the loop\n\
+         is left out. The true loop has more gain and a larger bandwidth, and smaller margins and ramp lag. State it in the\n\
+         contact, in m per rad: `{component} = {sign}0.05` for an object with a radius of 50 mm.\n",
+        place(one)
+    ))
 }
 
 /// Says what the play of a contact does to a step.

@@ -2,6 +2,7 @@
 
 use serde::Serialize;
 
+use crate::motion::COMPONENTS;
 use crate::tool::control::contacts::Contact;
 use crate::tool::control::law::{Feature, Law};
 use crate::tool::control::margins::{Margins, margins};
@@ -21,6 +22,9 @@ pub(super) struct Stability {
     /// How far the sensor moves after a turn until a contact that sticks follows.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(super) play: Option<Play>,
+    /// The component that rolls the sensor for a place, where the bench does not say how far the contact then moves.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(super) left_out: Option<&'static str>,
     /// `None` if nothing says how the feature answers.
     pub(super) margins: Option<Margins>,
 }
@@ -59,6 +63,17 @@ impl Play {
     }
 }
 
+/// Returns the component that rolls the sensor for a place, where the bench does not say how far the contact then moves.
+fn left_out(feature: &Feature, contact: &Contact) -> Option<&'static str> {
+    let rolling = match feature.quantity()? {
+        "x" => 4,
+        "y" => 3,
+        _ => return None,
+    };
+    let is_known = contact.answer(feature.quantity()?)?.row()[rolling] != 0.0;
+    (feature.column[rolling] != 0.0 && !is_known).then_some(COMPONENTS[rolling])
+}
+
 /// Returns the margins of all features that a law controls, with the contacts that the bench declares for the arm.
 pub(super) fn stability(declared: &[Contact], law: &Law) -> Vec<Stability> {
     let alone = [Contact::by_geometry()];
@@ -75,6 +90,7 @@ pub(super) fn stability(declared: &[Contact], law: &Law) -> Vec<Stability> {
                 .as_ref()
                 .filter(|margins| margins.is_stable)
                 .and_then(|margins| Play::of(feature, contact, margins)),
+            left_out: left_out(feature, contact),
             margins,
         }
     };

@@ -14,7 +14,7 @@ use crate::tool::control::law::Feature;
 pub(super) fn check(arm: &Arm<'_>) -> Diagnostics {
     let mut found = Diagnostics::new();
     for mode in &arm.modes {
-        found.extend(mode.moving().filter_map(|feature| unfiltered(mode, feature)));
+        found.extend(mode.moving().filter_map(|feature| unfiltered(mode, feature, "remove `kd`")));
         found.extend(mode.moving().filter_map(|feature| slow(arm, mode, feature)));
         found.extend(mode.moving().filter_map(|feature| hunting(mode, feature).or_else(|| windup(arm, mode, feature))));
     }
@@ -73,7 +73,8 @@ fn limited(mode: &ModeLaw<'_>, feature: &Feature, quantity: &str, gain: f64) -> 
         "x" | "y" => (0.01_f64.min(mode.farthest(feature)?), "m"),
         "orientation" => (0.5, "rad"),
         // At the first touch the error is the setpoint.
-        "pressure" | "force" => (feature.setpoint.filter(|setpoint| *setpoint > 0.0)?, "N"),
+        "pressure" => (feature.setpoint.filter(|setpoint| *setpoint > 0.0)?, "N/tactel"),
+        "force" => (feature.setpoint.filter(|setpoint| *setpoint > 0.0)?, "N"),
         _ => return None,
     };
     let limit = mode.gain(feature, "limit")?;
@@ -90,8 +91,8 @@ fn limited(mode: &ModeLaw<'_>, feature: &Feature, quantity: &str, gain: f64) -> 
     Some(Diagnostic::new(Code::UnusualGain, place, message).help(help))
 }
 
-/// Returns the warning about a derivative of a feature that no filter smooths.
-fn unfiltered(mode: &ModeLaw<'_>, feature: &Feature) -> Option<Diagnostic> {
+/// Returns the warning about a derivative of a feature that no filter smooths. `instead` is one way out.
+pub(super) fn unfiltered(mode: &ModeLaw<'_>, feature: &Feature, instead: &str) -> Option<Diagnostic> {
     let period = feature.period_s;
     // The difference of two samples has √2 times their noise.
     let factor = 2.0_f64.sqrt() * feature.kd / period;
@@ -111,7 +112,7 @@ fn unfiltered(mode: &ModeLaw<'_>, feature: &Feature) -> Option<Diagnostic> {
     );
     let smooth = (5.0 * period * 1e3).max(20.0).ceil();
     let place = if is_switched { "on this side" } else { &format!("on the wire that measures `{name}`") };
-    let help = format!("remove `kd`, or put a `low_pass` with `time_constant_ms = {smooth}` {place}");
+    let help = format!("{instead}, or put a `low_pass` with `time_constant_ms = {smooth}` {place}");
     Some(Diagnostic::new(Code::UnfilteredDerivative, mode.place_of_gain(feature, "kd"), message).help(help))
 }
 

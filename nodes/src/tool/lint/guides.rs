@@ -23,9 +23,9 @@ pub(super) fn is_composed(guide: &Guidance) -> bool {
     guide.kind == "compose_twist"
 }
 
-/// Returns whether a node rolls the sensor over a surface.
+/// Returns whether a node rolls the sensor over a surface, or lets somebody roll it.
 pub(super) fn rolls_along(guide: &Guidance) -> bool {
-    guide.kind == "follow_surface"
+    ["follow_surface", "guidance"].contains(&&*guide.kind)
 }
 
 /// Returns whether a node moves the sensor away from the object to its place of rest. Its gate may be closed.

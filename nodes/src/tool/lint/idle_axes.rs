@@ -14,10 +14,22 @@ use crate::tool::control::nodes::source;
 
 /// Returns the warnings about components that a projector selects and that nothing moves.
 pub(super) fn check<'a>(arm: &Arm<'a>, mode: &ModeLaw<'a>) -> Diagnostics {
-    projectors(&mode.nodes, &arm.twist).into_iter().flat_map(|projector| idle_axes(arm, mode, projector)).collect()
+    let all = projectors(&mode.nodes, &arm.twist);
+    all.iter().flat_map(|projector| idle_axes(arm, mode, projector, &dropped(mode, &all, projector))).collect()
 }
 
-fn idle_axes<'a>(arm: &Arm<'a>, mode: &ModeLaw<'a>, projector: &'a OutlinedBlock) -> Diagnostics {
+/// Returns the components that another projector drops on the way from one to the arm.
+fn dropped<'a>(mode: &ModeLaw<'a>, all: &[&'a OutlinedBlock], projector: &OutlinedBlock) -> [bool; 6] {
+    let is_behind = |other: &&&OutlinedBlock| {
+        let before = source(other, "twist").map(|twist| projectors(&mode.nodes, twist)).unwrap_or_default();
+        before.iter().any(|one| one.name == projector.name)
+    };
+    let select = |other: &OutlinedBlock| mode.nodes.value(other, "select")?.value.read::<[f64; 6]>();
+    let behind: Vec<[f64; 6]> = all.iter().filter(is_behind).filter_map(|other| select(other)).collect();
+    std::array::from_fn(|i| behind.iter().any(|select| select[i] == 0.0))
+}
+
+fn idle_axes<'a>(arm: &Arm<'a>, mode: &ModeLaw<'a>, projector: &'a OutlinedBlock, dropped: &[bool; 6]) -> Diagnostics {
     let select = mode.nodes.value(projector, "select");
     let behind = source(projector, "twist").map(|twist| law(&mode.nodes, twist));
     let Some((setting, behind)) = select.zip(behind) else { return Diagnostics::new() };
@@ -32,7 +44,8 @@ fn idle_axes<'a>(arm: &Arm<'a>, mode: &ModeLaw<'a>, projector: &'a OutlinedBlock
     let laws: Vec<Law> = arm.modes.iter().map(|mode| law(&mode.nodes, twist)).collect();
     let is_driven = |i: usize| laws.iter().flat_map(|law| &law.constants).any(|constant| constant.twist[i] != 0.0);
     let columns = || laws.iter().flat_map(|law| &law.features).map(|feature| &feature.column);
-    let is_idle = |i: &usize| select[*i] != 0.0 && columns().all(|column| column[*i] == 0.0) && !is_driven(*i);
+    let moves = |i: usize| columns().any(|column| column[i] != 0.0) || is_driven(i);
+    let is_idle = |i: &usize| select[*i] != 0.0 && !dropped[*i] && !moves(*i);
     let jacobians: BTreeSet<&str> = behind.features.iter().map(|feature| &*feature.jacobian).collect();
     let jacobians: Vec<String> = jacobians.into_iter().map(|name| format!("`{name}`")).collect();
     let report = |i: usize| {

@@ -7,6 +7,7 @@ use nalgebra::Vector3;
 use tactflow_runtime::source::{Code, Diagnostic, Diagnostics, Table, Value};
 
 use super::arm::Arm;
+use super::geometry::is_force;
 use super::guides::{follows_line, rests};
 use super::mode_law::ModeLaw;
 use crate::motion::pose::pose_of;
@@ -20,7 +21,41 @@ const LYING: f64 = 0.5;
 const LONG_MS: f64 = 5000.0;
 
 pub(super) fn check(arm: &Arm<'_>) -> Diagnostics {
-    arm.modes.iter().filter_map(|mode| along_line(arm, mode)).collect()
+    arm.modes.iter().filter_map(|mode| along_line(arm, mode).or_else(|| over_line(arm, mode))).collect()
+}
+
+/// Returns the warning about both positions over a pen or a cable that the bench states to be longer than the pad, where
+/// nothing holds its angle: at least one of them lies along it.
+fn over_line(arm: &Arm<'_>, mode: &ModeLaw<'_>) -> Option<Diagnostic> {
+    let is_free = line_angle(mode).is_none() && !mode.moving().any(|one| mode.quantity(one) == Some("orientation"));
+    // How hard the sensor presses says nothing about whether the contact is centred.
+    let is_press = |when: &str| arm.watched(mode, when).is_some_and(|quantity| is_force(&quantity));
+    let mut exits = mode.conditions();
+    let lasts = exits.all(|exit| exit.is_lost() || exit.waits() >= LONG_MS || exit.when().is_some_and(is_press));
+    if !is_free || !lasts || !arm.objects().all(is_thin) {
+        return None;
+    }
+    let [x, y] = [held(mode, 0)?, held(mode, 1)?];
+    let line = shortest_line(arm, mode, y).filter(Line::is_longer)?;
+    let message = format!(
+        "{}`{}` and `{}` are controlled over {line}: the middle of a long print says nothing about a position along it",
+        mode.prefix(),
+        x.name,
+        y.name
+    );
+    let help = "control the angle of the line too, and the position across it only";
+    Some(Diagnostic::new(Code::LinePosition, mode.place_of_column(y), message).help(help))
+}
+
+/// Returns whether an object is a line, whichever side of it is touched.
+fn is_thin(object: &Table) -> bool {
+    object.get("shape").and_then(Value::as_str).is_some_and(|shape| ["pen", "cable"].contains(&shape))
+}
+
+/// Returns the feature that holds the position along an axis: 0 is x, and 1 is y.
+fn held<'m>(mode: &'m ModeLaw<'_>, i: usize) -> Option<&'m Feature> {
+    let axis = ["x", "y"][i];
+    mode.moving().find(|feature| mode.quantity(feature) == Some(axis) && feature.column[i] != 0.0)
 }
 
 /// Returns the warning about a position that a mode controls along a line, while it moves the sensor along this line, or
@@ -37,11 +72,8 @@ fn along_line(arm: &Arm<'_>, mode: &ModeLaw<'_>) -> Option<Diagnostic> {
     let mut constants = mode.law.constants.iter().filter(|constant| along(&|i| constant.twist[i] != 0.0));
     let is_guide = |guide: &&Guidance| follows_line(guide) && !rests(&mode.nodes, guide) && along(&|i| guide.passes[i]);
     let guide = || mode.law.guidance.iter().find(is_guide).map(Guidance::node);
-    let held = |i: usize| {
-        let axis = ["x", "y"][i];
-        mode.moving().find(|feature| mode.quantity(feature) == Some(axis) && feature.column[i] != 0.0)
-    };
-    let feature = held(usize::from(*positions.first()? == "y")).filter(|_| along(&|i| held(i).is_some()))?;
+    let first = usize::from(*positions.first()? == "y");
+    let feature = held(mode, first).filter(|_| along(&|i| held(mode, i).is_some()))?;
     let stated = shortest_line(arm, mode, feature);
     let why = match constants.next().map(|constant| &*constant.node).or_else(guide) {
         Some(follower) if stated.as_ref().is_none_or(Line::is_longer) => format!("the line that `{follower}` follows"),

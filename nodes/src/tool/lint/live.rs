@@ -1,10 +1,14 @@
-//! Loops that are stable, and that a change while the arm moves may make unstable.
+//! Gains and setpoints that may change while the arm moves, up to values with which the task fails.
+
+use std::ops::Range;
 
 use tactflow_runtime::graph::OutlinedRange;
 use tactflow_runtime::source::{Code, Diagnostic, Diagnostics, Edit};
 
 use super::arm::Arm;
+use super::gains::unfiltered;
 use super::mode_law::ModeLaw;
+use super::reach::{Unreachable, unreachable};
 use super::stability::{KEPT, is_known, over, unmeasured};
 use crate::tool::control::digits::down_to_two_digits;
 use crate::tool::control::law::Feature;
@@ -18,7 +22,82 @@ pub(super) fn check(arm: &Arm<'_>) -> Diagnostics {
     let loops = || arm.modes.iter().flat_map(|mode| mode.moving().map(move |feature| (mode, feature)));
     let of_range = |range| loops().filter_map(move |(mode, feature)| Changed::of(feature, range)?.judge(arm, mode));
     let tightest = |range| of_range(range).min_by(|(one, _), (other, _)| one.total_cmp(other));
-    arm.outline.live.iter().filter_map(tightest).map(|(_, found)| found).collect()
+    let simple =
+        |range| loops().find_map(|(mode, feature)| reversed(feature, range).or_else(|| noisy(mode, feature, range)));
+    let setpoint = |range| loops().find_map(|(mode, feature)| out_of_reach(arm, mode, feature, range));
+    let first = |range| simple(range).or_else(|| setpoint(range)).or_else(|| Some(tightest(range)?.1));
+    arm.outline.live.iter().filter_map(first).collect()
+}
+
+/// Returns the gain of a feature that a range is about, and its value as written.
+fn gain(feature: &Feature, range: &OutlinedRange) -> Option<(&'static str, f64)> {
+    let (node, gain) = range.name.split_once(".gains.")?;
+    let (name, key) = gain.rsplit_once('.')?;
+    let gains = [("kp", feature.kp), ("ki", feature.ki), ("kd", feature.kd)];
+    let is_own = feature.pid.as_deref() == Some(node) && feature.name == name;
+    gains.into_iter().find(|(one, _)| is_own && *one == key)
+}
+
+/// Returns a feature with another gain.
+fn with(feature: &Feature, key: &str, gain: f64) -> Feature {
+    let mut feature = feature.clone();
+    match key {
+        "kp" => feature.kp = gain,
+        "ki" => feature.ki = gain,
+        _ => feature.kd = gain,
+    }
+    feature
+}
+
+/// Returns the warning about a range that reaches down to a gain of the wrong sign.
+fn reversed(feature: &Feature, range: &OutlinedRange) -> Option<Diagnostic> {
+    let ([least, _], [place, _]) = (range.range, &range.spans);
+    gain(feature, range).filter(|_| least < 0.0)?;
+    let message =
+        format!("`{}` may become {least}: the motion then increases the error of `{}`", range.name, feature.name);
+    let diagnostic = Diagnostic::new(Code::UnusualGain, place.clone(), message);
+    Some(diagnostic.help("write `min = 0.0` or more").edit(Edit::Replace(place.clone(), "0.0".into())))
+}
+
+/// Returns the warning about a range that reaches up to a derivative gain that makes too much of the noise.
+fn noisy(mode: &ModeLaw<'_>, feature: &Feature, range: &OutlinedRange) -> Option<Diagnostic> {
+    let ([_, most], [_, place]) = (range.range, &range.spans);
+    gain(feature, range).filter(|(key, value)| *key == "kd" && *value < most)?;
+    let noise = |feature: &Feature| unfiltered(mode, feature, "write a smaller `max`");
+    let found = noise(&with(feature, "kd", most)).filter(|_| noise(feature).is_none())?;
+    let message = format!("`{}` may become {most}, and then {}", range.name, found.message);
+    Some(Diagnostic { span: place.clone(), message, ..found })
+}
+
+/// Returns the warning about a range of a setpoint that reaches beyond a limit, a threshold, or the pad.
+fn out_of_reach(arm: &Arm<'_>, mode: &ModeLaw<'_>, feature: &Feature, range: &OutlinedRange) -> Option<Diagnostic> {
+    let (node, name) = range.name.split_once(".setpoint.")?;
+    if feature.compared.as_deref() != Some(node) || feature.name != name || beyond(arm, mode, feature).is_some() {
+        return None;
+    }
+    let ends = range.range.into_iter().zip(&range.spans);
+    ends.into_iter().find_map(|(setpoint, place)| {
+        let why = beyond(arm, mode, &Feature { setpoint: Some(setpoint), ..feature.clone() })?;
+        let message = format!("`{}` may become {setpoint}, but {why}", range.name);
+        let help = format!("let the range of `{name}` end well before that");
+        Some(Diagnostic::new(Code::UnreachableSetpoint, place.clone(), message).help(help))
+    })
+}
+
+/// Returns why the setpoint of a feature is out of reach.
+fn beyond(arm: &Arm<'_>, mode: &ModeLaw<'_>, feature: &Feature) -> Option<String> {
+    if let Some(why) = unreachable(arm, mode, feature) {
+        return Some(match why {
+            Unreachable::AboveLimit { most, key } => format!("the limit `{key}` is {most}"),
+            Unreachable::BelowThreshold { threshold, node, what } => {
+                format!("`{node}` drops {what} below {threshold}: the contact is lost before it is reached")
+            }
+        });
+    }
+    let setpoint = feature.setpoint.filter(|_| matches!(mode.quantity(feature), Some("x" | "y")))?;
+    let [from, to] = mode.range(feature)?;
+    let is_beside = !(from..=to).contains(&setpoint);
+    is_beside.then(|| format!("the pad measures it from {from} to {to} m"))
 }
 
 /// A feature with a gain that may change.
@@ -26,31 +105,24 @@ struct Changed<'a> {
     feature: &'a Feature,
     key: &'static str,
     value: f64,
-    range: &'a OutlinedRange,
+    /// The largest value that it may have, and where that is written.
+    most: f64,
+    place: &'a Range<usize>,
+    /// Its name in `[live]`.
+    name: &'a str,
 }
 
 impl<'a> Changed<'a> {
     /// Returns the feature if the range is that of one of its gains, and allows a larger one.
     fn of(feature: &'a Feature, range: &'a OutlinedRange) -> Option<Self> {
-        let (node, gain) = range.name.split_once(".gains.")?;
-        let (name, key) = gain.rsplit_once('.')?;
-        if feature.pid.as_deref() != Some(node) || feature.name != name {
-            return None;
-        }
-        let gains = [("kp", feature.kp), ("ki", feature.ki), ("kd", feature.kd)];
-        let (key, value) = gains.into_iter().find(|(one, _)| *one == key)?;
-        (value < range.max).then_some(Self { feature, key, value, range })
+        let (key, value) = gain(feature, range)?;
+        let ([_, most], [_, place]) = (range.range, &range.spans);
+        (value < most).then_some(Self { feature, key, value, most, place, name: &range.name })
     }
 
     /// Returns the feature with another gain.
     fn with(&self, gain: f64) -> Feature {
-        let mut feature = self.feature.clone();
-        match self.key {
-            "kp" => feature.kp = gain,
-            "ki" => feature.ki = gain,
-            _ => feature.kd = gain,
-        }
-        feature
+        with(self.feature, self.key, gain)
     }
 
     /// Returns the warning about a range that reaches up to a gain with which a loop is unstable, and the largest gain
@@ -63,21 +135,21 @@ impl<'a> Changed<'a> {
         let around = |gain: f64, contact| Loop::over(&self.with(gain), contact).filter(|around| !around.is_reversed());
         let is = |holds: &dyn Fn(&Loop) -> bool, gain, contact| around(gain, contact).is_none_or(|one| holds(&one));
         let is_stable = |around: &Loop| margins(around).is_stable;
-        let shaken = contacts.iter().find(|contact| !is(&is_stable, self.range.max, contact))?;
+        let shaken = contacts.iter().find(|contact| !is(&is_stable, self.most, contact))?;
         if !is(&is_stable, self.value, shaken) {
             return None;
         }
         let holds = |gain: &f64| contacts.iter().all(|one| is(&|around| KEPT.holds(&margins(around)), *gain, one));
-        let tried = std::iter::successors(Some(self.range.max), |gain| Some(gain * 0.95)).take(TRIED);
+        let tried = std::iter::successors(Some(self.most), |gain| Some(gain * 0.95)).take(TRIED);
         let best = tried.take_while(|gain| *gain > self.value).find(holds).map(down_to_two_digits);
-        let (key, name, range) = (self.key, &self.feature.name, self.range);
+        let (key, name, place) = (self.key, &self.feature.name, self.place);
         let message = format!(
             "`{}` may become {}, and the loop of `{name}` is then unstable {}",
-            range.name,
-            range.max,
+            self.name,
+            self.most,
             over(shaken.name())
         );
-        let diagnostic = Diagnostic::new(Code::LowMargin, range.span.clone(), message)
+        let diagnostic = Diagnostic::new(Code::LowMargin, place.clone(), message)
             .note(mode.place_of_gain(self.feature, key), format!("`{key}` is {} as written", self.value));
         // A range that ends below the gain as written is a mistake.
         let best = best.filter(|best| *best > self.value);
@@ -86,7 +158,7 @@ impl<'a> Changed<'a> {
                 let kp = Some(best).filter(|_| self.key == "kp");
                 let why = unmeasured(self.feature, contacts, shaken.name(), kp).unwrap_or_default();
                 let help = format!("write `max = {best}` or less{why}");
-                diagnostic.help(help).edit(Edit::Replace(range.span.clone(), format!("{best:?}")))
+                diagnostic.help(help).edit(Edit::Replace(place.clone(), format!("{best:?}")))
             }
             None => diagnostic.help("no larger gain keeps the margins: remove the line from `[live]`"),
         };

@@ -122,7 +122,12 @@ fn unreachable_setpoint(arm: &Arm<'_>, mode: &ModeLaw<'_>, feature: &Feature) ->
                 "the setpoint of `{name}` is {setpoint}, but `{node}` drops {what} below {threshold}: the contact is lost \
                  before it is reached"
             ),
-            format!("write a setpoint well above {threshold}, for example {}", (3e6 * threshold).round() / 1e6),
+            {
+                let three = (3e6 * threshold).round() / 1e6;
+                let limit = arm.force_limit(mode, mode.quantity(feature)?).map_or(f64::INFINITY, |(most, _)| most);
+                let example = if three < limit { format!(", for example {three}") } else { String::new() };
+                format!("write a setpoint well above {threshold}{example}, or a smaller threshold of `{node}`")
+            },
         ),
     };
     Some(Diagnostic::new(Code::UnreachableSetpoint, mode.place_of_setpoint(feature)?, message).help(help))
@@ -145,7 +150,7 @@ fn beside_window(mode: &ModeLaw<'_>, feature: &Feature) -> Option<Diagnostic> {
         "the setpoint of `{name}` is {setpoint} m, but `{}` shows the pad from {from} to {to} m: it is never reached",
         window.name
     );
-    let help = format!("write a setpoint between {from} and {to}, or a larger `size` of `{}`", window.name);
+    let help = format!("write a setpoint well inside of {from} to {to}, or a larger `size` of `{}`", window.name);
     Some(Diagnostic::new(Code::UnreachableSetpoint, mode.place_of_setpoint(feature)?, message).help(help))
 }
 

@@ -27,7 +27,7 @@ pub(super) fn check(arm: &Arm<'_>, mode: &ModeLaw<'_>) -> Option<Diagnostic> {
         mode.prefix(),
         COMPONENTS[i]
     );
-    let help = "control the pressure along `vz` in this mode, or select no rolling: 0 for `wx` and `wy`";
+    let help = "control the pressure along `vz` in this mode, or let nothing roll: select 0 for `wx` and `wy` of all that moves the sensor";
     Some(Diagnostic::new(Code::UnforcedRolling, place, message).help(help))
 }
 

@@ -220,15 +220,36 @@ fn without_gain(mode: &ModeLaw<'_>, feature: &Feature, loops: &[Loop], diagnosti
     let holds = |share: &f64| loops.iter().all(|around| is_good(around.with_integral_share(*share)));
     let mut shares = std::iter::successors(Some(0.9), |share| Some(share * 0.9)).take(66).filter(|_| feature.ki > 0.0);
     if let Some(ki) = shares.find(holds).map(|share| down_to_two_digits(feature.ki * share)) {
-        return diagnostic
+        let place = mode.place_of_gain(feature, "ki");
+        return Diagnostic { span: place.clone(), ..diagnostic }
             .help(format!("write `ki = {ki}` or less in the gains of `{}`", feature.name))
-            .edit(Edit::Replace(mode.place_of_gain(feature, "ki"), format!("{ki:?}")));
+            .edit(Edit::Replace(place, format!("{ki:?}")));
+    }
+    if let Some([kp, ki]) = both(feature, loops) {
+        let help = format!("write `kp = {kp}` and `ki = {ki}` or less in the gains of `{}`", feature.name);
+        let edits = [("kp", kp), ("ki", ki)];
+        return edits.into_iter().fold(diagnostic.help(help), |diagnostic, (key, gain)| {
+            diagnostic.edit(Edit::Replace(mode.place_of_gain(feature, key), format!("{gain:?}")))
+        });
     }
     let has_filters = feature.filters.iter().any(|filter| filter.shape.smooths());
     diagnostic.help(match has_filters {
         true => "no smaller gain keeps the margins: use faster filters",
         false => "no smaller gain keeps the margins",
     })
+}
+
+/// Returns the largest `kp` that keeps the margins of all loops with some integral, and that integral: where the filters
+/// are slow, a smaller `kp` alone leaves too much of it.
+fn both(feature: &Feature, loops: &[Loop]) -> Option<[f64; 2]> {
+    let smaller = |ratio: f64| std::iter::successors(Some(ratio), move |share| Some(share * ratio)).take(20);
+    let is_good = |factor: f64, share: f64| {
+        let judged = |around: &Loop| judge_loop(feature, &around.times(factor).with_integral_share(share));
+        loops.iter().all(|around| judged(around).is_good())
+    };
+    let found = smaller(0.8).find_map(|factor| Some([factor, smaller(0.7).find(|share| is_good(factor, *share))?]));
+    let [factor, share] = found.filter(|_| feature.ki > 0.0 && feature.kd == 0.0)?;
+    Some([feature.kp * factor, feature.ki * factor * share].map(down_to_two_digits))
 }
 
 /// Gain of a loop with which the recipe of docs/control.md begins [1/s].

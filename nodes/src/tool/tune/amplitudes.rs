@@ -6,8 +6,10 @@ use super::Stop;
 use super::experiment::{Answered, Experiment};
 use super::fit::ENOUGH;
 use super::limited::Limited;
+use super::load::Room;
 use super::play::play;
 use super::spectrum::Line;
+use crate::tool::control::digits::down_to_two_digits;
 
 /// Amplitudes of a linear [m] and of an angular test signal [rad], one after the other.
 const AMPLITUDES: [[f64; 4]; 2] = [[0.3e-3, 1.2e-3, 2.4e-3, 4.8e-3], [0.01, 0.02, 0.04, 0.08]];
@@ -58,51 +60,82 @@ pub(super) fn agreed(
     component: usize,
     shell: &Shell,
 ) -> Result<(Result<Response, Refusal>, Option<f64>), Stop> {
-    let (mut runs, mut limited): (Vec<Vec<Line>>, Vec<Option<Limited>>) = (Vec::new(), Vec::new());
-    let (mut stopped, mut is_absent) = (None, false);
-    let unit = if component < 3 { "m" } else { "rad" };
-    let amplitudes = AMPLITUDES[component / 3];
-    for amplitude in amplitudes {
-        shell.say_beside(&format!("`{}`: a test signal of {amplitude} {unit}", experiment.feature.name));
-        match experiment.run(component, amplitude)? {
-            Answered::Lines(lines, limit) => {
-                runs.push(lines);
-                limited.push(limit);
-            }
-            Answered::Nothing { why, is_absent: absent } => {
-                is_absent = absent;
-                stopped = Some(format!("with a test signal of {amplitude} {unit}, {why}"));
-                break;
-            }
-            Answered::NotReached(why) if runs.is_empty() => {
-                return Ok((Err(Refusal { why, kind: Unknown::NotReached }), None));
-            }
-            Answered::NotReached(why) => {
-                stopped = Some(why);
-                break;
-            }
-            Answered::Interrupted => return Err(Stop::Interrupted),
-        }
-    }
+    let Runs { runs, mut limited, stopped, is_absent, amplitude } = runs(experiment, component, shell)?;
     let play = play(experiment.feature, component, runs.iter().flatten());
-    // A light contact is not linear where a motion nearly lifts the pad off.
-    let lifts_off = stopped.as_ref().map(|_| amplitudes[runs.len()]).filter(|_| component == PRESSES && is_absent);
     if let Some((lines, growth, last)) = largest(&runs) {
-        let lifts_off = lifts_off.filter(|_| growth.is_some());
+        // A light contact is not linear where a motion nearly lifts the pad off.
+        let lifts_off = Some(amplitude).filter(|_| component == PRESSES && is_absent && growth.is_some());
         return Ok((Ok(Response { lines, growth, limited: limited[last].take(), lifts_off }), play));
     }
     let agree = (1..runs.len()).any(|i| difference(&runs[i - 1], &runs[i]) < AGREES);
-    let kind = if !agree && stopped.is_some() { Unknown::Lost } else { Unknown::Hidden };
     let lighter = if component < 2 { "; a lighter press has less friction" } else { "" };
-    let why = match agree {
-        true => format!("friction holds the contact back: only the largest test signal moves it{lighter}"),
-        false => stopped.unwrap_or_else(|| {
-            format!(
+    let refusal = match (agree, stopped) {
+        (true, _) => Refusal {
+            why: format!("friction holds the contact back: only the largest test signal moves it{lighter}"),
+            kind: Unknown::Hidden,
+        },
+        (false, Some(refusal)) => refusal,
+        (false, None) => Refusal {
+            why: format!(
                 "no two test signals gave the same response at {ENOUGH} frequencies that stand out of the noise{lighter}"
-            )
-        }),
+            ),
+            kind: Unknown::Hidden,
+        },
     };
-    Ok((Err(Refusal { why, kind }), play))
+    Ok((Err(refusal), play))
+}
+
+/// The runs with test signals of growing amplitudes.
+struct Runs {
+    runs: Vec<Vec<Line>>,
+    /// The limit that has acted most in each of them, if it has acted much.
+    limited: Vec<Option<Limited>>,
+    /// Why there are not more.
+    stopped: Option<Refusal>,
+    /// Whether the feature was absent in the last one.
+    is_absent: bool,
+    /// The last amplitude [m] or [rad].
+    amplitude: f64,
+}
+
+/// Moves further and further along a component, as far as the task stays in its mode, and as far as the limits of a force
+/// leave room.
+fn runs(experiment: &Experiment<'_>, component: usize, shell: &Shell) -> Result<Runs, Stop> {
+    let mut found = Runs { runs: Vec::new(), limited: Vec::new(), stopped: None, is_absent: false, amplitude: 0.0 };
+    let unit = if component < 3 { "m" } else { "rad" };
+    let mut room: Option<Room> = None;
+    for wanted in AMPLITUDES[component / 3] {
+        let least = wanted.min(FURTHER * found.amplitude);
+        if let Some(room) = room.as_ref().filter(|room| room.amplitude < least) {
+            let why = format!(
+                "a test signal of more than {} {unit} would come near the limit `{}`; raise it, or lower the setpoint",
+                found.amplitude, room.limit
+            );
+            found.stopped = Some(Refusal { why, kind: Unknown::Hidden });
+            break;
+        }
+        let amplitude = room.as_ref().map_or(wanted, |room| down_to_two_digits(room.amplitude.min(wanted)));
+        found.amplitude = amplitude;
+        shell.say_beside(&format!("`{}`: a test signal of {amplitude} {unit}", experiment.feature.name));
+        let (why, kind) = match experiment.run(component, amplitude)? {
+            Answered::Lines { lines, limited, room: left } => {
+                found.runs.push(lines);
+                found.limited.push(limited);
+                room = left;
+                continue;
+            }
+            Answered::Nothing { why, is_absent } => {
+                found.is_absent = is_absent;
+                (format!("with a test signal of {amplitude} {unit}, {why}"), Unknown::Lost)
+            }
+            Answered::NotReached(why) if found.runs.is_empty() => (why, Unknown::NotReached),
+            Answered::NotReached(why) => (why, Unknown::Lost),
+            Answered::Interrupted => return Err(Stop::Interrupted),
+        };
+        found.stopped = Some(Refusal { why, kind });
+        break;
+    }
+    Ok(found)
 }
 
 /// Returns the response to the largest motions that agree, or to one of the last two if they differ a little: then with

@@ -9,6 +9,7 @@ use tactflow_runtime::record::PortColumns;
 use super::gain_keys::gains;
 use super::lift;
 use super::limited::{Limited, Watch};
+use super::load::{Loads, Room};
 use super::signal::{Pace, Sine, duration, measured, settling};
 use super::spectrum::{Line, line};
 use super::stay::Stay;
@@ -20,6 +21,9 @@ use crate::tool::control::response::Loop;
 
 /// Beginning of the names of the nodes that make the test signal.
 const SIGNAL: &str = "tune";
+
+/// Time before the test signal in which the load on the pad is that of the contact at rest [s].
+const CALM_S: f64 = 1.0;
 
 /// The loop that an experiment opens with its signal.
 pub(super) struct Experiment<'a> {
@@ -52,8 +56,8 @@ pub(super) fn known(feature: &Feature, component: usize) -> impl Fn(f64) -> Comp
 /// What one run said.
 #[derive(Debug)]
 pub(super) enum Answered {
-    /// The lines of the spectrum, and the limit that has acted much.
-    Lines(Vec<Line>, Option<Limited>),
+    /// The lines of the spectrum, the limit that has acted much, and the room that the limits of a force leave.
+    Lines { lines: Vec<Line>, limited: Option<Limited>, room: Option<Room> },
     /// Why there are none, such as a mode that was left, and whether the feature was absent.
     Nothing { why: String, is_absent: bool },
     /// Why the task has not reached the mode.
@@ -70,14 +74,16 @@ impl Experiment<'_> {
     pub(super) fn run(&self, component: usize, amplitude: f64) -> Result<Answered, String> {
         let settings = self.settings(component, amplitude);
         lift::unless_it_bounces((self.task, self.request), &settings, self.mode, |request| {
-            self.attempt(component, request)
+            self.attempt((component, amplitude), request)
         })
     }
 
     /// Runs with a signal along a component. Also returns whether the pad has bounced at the first touch.
-    fn attempt(&self, component: usize, request: &Request) -> Result<(Answered, bool), String> {
+    fn attempt(&self, (component, amplitude): (usize, f64), request: &Request) -> Result<(Answered, bool), String> {
         let compiled = compile(self.catalogue, request).map_err(|report| report.render(false))?;
+        let outline = compiled.outline().clone();
         let mut engine = Engine::new(compiled);
+        let mut loads = Loads::new(&outline, &engine);
         let pid = self.feature.pid.as_deref().unwrap_or_default();
         let find = |engine: &Engine, name: String| {
             PortColumns::find(engine.ports(), &self.task.port(&name)).ok_or_else(|| format!("no port is `{name}`"))
@@ -87,6 +93,7 @@ impl Experiment<'_> {
         let sines = Sine::all(self.period);
         let wanted = sines.last().map_or(0, Sine::end);
         let (mut limits, settled) = (Watch::new(&engine), settling(self.period));
+        let calm = ((CALM_S / self.period) as usize).min(settled);
         let mut stay = Stay::new(self.mode.name.clone(), settled, wanted);
         let options = RunOptions { duration: Some(duration(self.period)), ..RunOptions::default() };
         let column = self.feature.column[component];
@@ -95,6 +102,9 @@ impl Experiment<'_> {
             stay.see(self.task.mode(engine), || [read(control) * column, read(all)]);
             if (settled..wanted).contains(&stay.rows().len()) {
                 limits.see(engine);
+            }
+            if (settled - calm..wanted).contains(&stay.rows().len()) {
+                loads.see(engine, stay.rows().len() < settled);
             }
         });
         let outcome = outcome.map_err(|error| format!("the run cannot start: {error}"))?;
@@ -114,7 +124,11 @@ impl Experiment<'_> {
                 nothing(format!("the mode `{}` lasted {seconds:.1} s only", self.mode.name))
             }
             _ if is_absent => nothing(format!("`{}` was absent for a while", self.feature.name)),
-            _ => Answered::Lines(sines.iter().map(|sine| self.line(rows, sine)).collect(), limits.most()),
+            _ => Answered::Lines {
+                lines: sines.iter().map(|sine| self.line(rows, sine)).collect(),
+                limited: limits.most(),
+                room: loads.room(amplitude),
+            },
         };
         Ok((answered, stay.has_bounced()))
     }

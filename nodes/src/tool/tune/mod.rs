@@ -12,6 +12,7 @@ mod gain_keys;
 mod identify;
 mod lift;
 mod limited;
+mod load;
 mod page;
 mod play;
 mod propose;

@@ -1,0 +1,64 @@
+//! Ranges of `[live]`, and what else becomes poor by what others do: an operator, a guide, or the object.
+
+use super::variant::{Variant, on, variant};
+
+/// Gains with a derivative, which `[live]` may change.
+const DERIVATIVE: &str = "gains.x = { kp = 3.3, kd = 0.0, rise = 0.25 }";
+
+pub(super) fn poor_by_others() -> Vec<(&'static str, Variant)> {
+    vec![
+        ("unusual-gain", variant("hybrid", &["set live.pid.gains.y.kp.min=-2.0"])),
+        (
+            "unfiltered-derivative",
+            variant("hybrid", &[DERIVATIVE, "set live.pid.gains.x.kd={ min = 0.0, max = 0.2, rate = 0.05 }"]),
+        ),
+        (
+            "unreachable-setpoint",
+            variant("hybrid", &["set live.error.setpoint.x={ min = -0.06, max = 0.06, rate = 0.01 }"]),
+        ),
+        ("unreachable-setpoint", pressure("{ min = 0.05, max = 5.0, rate = 0.1 }")),
+        ("unreachable-setpoint", pressure("{ min = 0.005, max = 0.2, rate = 0.1 }")),
+        // Nothing holds the angle of a pen that is longer than the pad.
+        ("line-position", on("pen", variant("position", &["set devices.bench.objects.0.length=0.3"]))),
+        // The guide rolls the sensor, and nothing presses.
+        ("unforced-rolling", guided("[1, 1, 0, 1, 1, 0]", "[0, 0, 0, 0, 0, 0]")),
+    ]
+}
+
+pub(super) fn good_by_others() -> Vec<Variant> {
+    vec![
+        variant(
+            "hybrid",
+            &[
+                DERIVATIVE,
+                "set live.pid.gains.x.kd={ min = 0.0, max = 0.005, rate = 0.05 }",
+                "set live.error.setpoint.x={ min = -0.02, max = 0.02, rate = 0.01 }",
+            ],
+        ),
+        pressure("{ min = 0.05, max = 0.2, rate = 0.1 }"),
+        on("pen", variant("position", &[])),
+        guided("[1, 1, 0, 1, 1, 0]", "[0, 0, 1, 0, 0, 0]"),
+        // What the first projector selects too much, the second one drops.
+        variant(
+            "square",
+            &[
+                "select = [1, 1, 1, 0, 0, 0]",
+                "set nodes.second.type=\"projector\"",
+                "set nodes.second.in.twist=\"projector.twist\"",
+                "set nodes.second.select=[0, 0, 1, 0, 0, 0]",
+                "in.touch = \"second.twist\"",
+            ],
+        ),
+    ]
+}
+
+/// A pressure whose setpoint an operator may change.
+fn pressure(range: &str) -> Variant {
+    variant("edge", &["set nodes.error.setpoint.pressure=0.1", &format!("set live.error.setpoint.pressure={range}")])
+}
+
+/// A guide that may move these components, while the controller moves those.
+fn guided(free: &str, controlled: &str) -> Variant {
+    let free = format!("set nodes.free.select={free}");
+    variant("guided", &[&free, &format!("set modes.guided.set.projector.select={controlled}")])
+}
