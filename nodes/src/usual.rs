@@ -59,7 +59,7 @@ pub fn unusual(param: &str, number: f64, [min, max]: [f64; 2], unit: Unit) -> Op
     let rounded = |end: f64| (end * 1e4).round() / 1e4;
     let name = if unit == Unit::default() { String::new() } else { format!(" {unit}") };
     let message = format!("`{param}` is {number}{name}, but usual is {} to {}{name}", rounded(min), rounded(max));
-    let within = format!("write a number well inside of {} to {}", rounded(min), rounded(max));
+    let within = format!("write a number from {} to {}", rounded(min), rounded(max));
     // Nobody writes a fraction of a smaller unit.
     let smaller = from_smaller_unit(number, unit).filter(|(converted, _)| number.abs() >= 1.0 && is_usual(*converted));
     let help = match smaller {
@@ -84,10 +84,7 @@ mod tests {
     fn only_a_force_in_newtons_is_unusual() {
         let warning = unusual_force("threshold", 15.0, USUAL_THRESHOLD_N, Unit::NEWTON).expect("15 mN");
         assert_eq!(warning.message, "`threshold` is 15 N, but usual is 0 to 5 N");
-        assert_eq!(
-            warning.help.as_deref(),
-            Some("if 15 is in mN, write `0.015`; or else write a number well inside of 0 to 5")
-        );
+        assert_eq!(warning.help.as_deref(), Some("if 15 is in mN, write `0.015`; or else write a number from 0 to 5"));
         for (value, unit) in [(5.0, Unit::NEWTON), (100.0, Unit::RAW)] {
             assert_eq!(unusual_force("threshold", value, USUAL_THRESHOLD_N, unit), None);
         }

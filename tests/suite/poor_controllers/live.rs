@@ -5,6 +5,10 @@ use super::variant::{Variant, on, variant};
 /// Gains with a derivative, which `[live]` may change.
 const DERIVATIVE: &str = "gains.x = { kp = 3.3, kd = 0.0, rise = 0.25 }";
 
+/// Components in which a guide also rolls the sensor, and a controller that moves none.
+const ROLLS: &str = "[1, 1, 0, 1, 1, 0]";
+const RESTS: &str = "[0, 0, 0, 0, 0, 0]";
+
 pub(super) fn poor_by_others() -> Vec<(&'static str, Variant)> {
     vec![
         ("unusual-gain", variant("hybrid", &["set live.pid.gains.y.kp.min=-2.0"])),
@@ -18,10 +22,13 @@ pub(super) fn poor_by_others() -> Vec<(&'static str, Variant)> {
         ),
         ("unreachable-setpoint", pressure("{ min = 0.05, max = 5.0, rate = 0.1 }")),
         ("unreachable-setpoint", pressure("{ min = 0.005, max = 0.2, rate = 0.1 }")),
+        ("unreachable-setpoint", pressure("{ min = 0.05, max = 2.95, rate = 0.1 }")),
         // Nothing holds the angle of a pen that is longer than the pad.
         ("line-position", on("pen", variant("position", &["set devices.bench.objects.0.length=0.3"]))),
         // The guide rolls the sensor, and nothing presses.
-        ("unforced-rolling", guided("[1, 1, 0, 1, 1, 0]", "[0, 0, 0, 0, 0, 0]")),
+        ("unforced-rolling", guided(ROLLS, RESTS, &[])),
+        // What the second projector drops moves the arm beside it.
+        ("idle-axis", twice(&["set nodes.sum.in.beside=\"projector.twist\""])),
     ]
 }
 
@@ -37,18 +44,20 @@ pub(super) fn good_by_others() -> Vec<Variant> {
         ),
         pressure("{ min = 0.05, max = 0.2, rate = 0.1 }"),
         on("pen", variant("position", &[])),
-        guided("[1, 1, 0, 1, 1, 0]", "[0, 0, 1, 0, 0, 0]"),
-        // What the first projector selects too much, the second one drops.
-        variant(
-            "square",
-            &[
-                "select = [1, 1, 1, 0, 0, 0]",
-                "set nodes.second.type=\"projector\"",
-                "set nodes.second.in.twist=\"projector.twist\"",
-                "set nodes.second.select=[0, 0, 1, 0, 0, 0]",
-                "in.touch = \"second.twist\"",
-            ],
+        guided(ROLLS, "[0, 0, 1, 0, 0, 0]", &[]),
+        guided(ROLLS, RESTS, &["set nodes.guidance.angular_rad_per_s=0.0"]),
+        guided(ROLLS, RESTS, &["set nodes.guidance.in.gate=\"modes.press\""]),
+        guided(ROLLS, RESTS, &["set modes.guided.set.reach.twist=[0, 0, -0.01, 0, 0, 0]"]),
+        // The pen lies along the diagonal of the pad, which is longer.
+        on(
+            "pen",
+            variant(
+                "hybrid",
+                &["set devices.bench.objects.0.length=0.09", "set devices.bench.objects.0.turn=[0, 0, 0.7854]"],
+            ),
         ),
+        // What the first projector selects too much, the second one drops.
+        twice(&[]),
     ]
 }
 
@@ -58,7 +67,19 @@ fn pressure(range: &str) -> Variant {
 }
 
 /// A guide that may move these components, while the controller moves those.
-fn guided(free: &str, controlled: &str) -> Variant {
+fn guided(free: &str, controlled: &str, more: &[&str]) -> Variant {
     let free = format!("set nodes.free.select={free}");
-    variant("guided", &[&free, &format!("set modes.guided.set.projector.select={controlled}")])
+    variant("guided", &[&[&*free, &format!("set modes.guided.set.projector.select={controlled}")], more].concat())
+}
+
+/// Two projectors, one behind the other.
+fn twice(more: &[&str]) -> Variant {
+    let second = [
+        "select = [1, 1, 1, 0, 0, 0]",
+        "set nodes.second.type=\"projector\"",
+        "set nodes.second.in.twist=\"projector.twist\"",
+        "set nodes.second.select=[0, 0, 1, 0, 0, 0]",
+        "in.touch = \"second.twist\"",
+    ];
+    variant("square", &[&second[..], more].concat())
 }

@@ -268,9 +268,10 @@ fn rolling(one: &Stability) -> Option<String> {
     let sign = if component == "wy" { "-" } else { "" };
     Some(format!(
         "{} also rolls with `{component}`, and the bench does not say how far the contact then moves: this part of the loop\n\
-         is left out. The true loop has more gain and a larger bandwidth, and smaller margins and ramp lag. State it in the\n\
-         contact, in m per rad: `{component} = {sign}0.05` for an object with a radius of 50 mm.\n",
-        place(one)
+         is left out. The true loop has more gain and a larger bandwidth, and smaller margins and ramp lag. State it in `{}`\n\
+         of the contact, in m per rad: `{component} = {sign}0.05` for an object with a radius of 50 mm.\n",
+        place(one),
+        one.feature
     ))
 }
 

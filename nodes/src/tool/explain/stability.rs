@@ -63,15 +63,18 @@ impl Play {
     }
 }
 
-/// Returns the component that rolls the sensor for a place, where the bench does not say how far the contact then moves.
+/// Returns the component that rolls the sensor for a place, where the bench does not say how far the contact then moves. A
+/// column that rolls against its own sliding has its own warning.
 fn left_out(feature: &Feature, contact: &Contact) -> Option<&'static str> {
-    let rolling = match feature.quantity()? {
-        "x" => 4,
-        "y" => 3,
+    let quantity = feature.quantity()?;
+    let answer = contact.answer(quantity)?;
+    let [vx, vy, _, wx, wy, _] = feature.column;
+    let (rolling, is_unknown, is_with) = match quantity {
+        "x" => (4, answer.wy.is_none(), vx * wy > 0.0),
+        "y" => (3, answer.wx.is_none(), vy * wx < 0.0),
         _ => return None,
     };
-    let is_known = contact.answer(feature.quantity()?)?.row()[rolling] != 0.0;
-    (feature.column[rolling] != 0.0 && !is_known).then_some(COMPONENTS[rolling])
+    (is_unknown && is_with).then_some(COMPONENTS[rolling])
 }
 
 /// Returns the margins of all features that a law controls, with the contacts that the bench declares for the arm.

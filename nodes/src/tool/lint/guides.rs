@@ -23,9 +23,14 @@ pub(super) fn is_composed(guide: &Guidance) -> bool {
     guide.kind == "compose_twist"
 }
 
-/// Returns whether a node rolls the sensor over a surface, or lets somebody roll it.
-pub(super) fn rolls_along(guide: &Guidance) -> bool {
-    ["follow_surface", "guidance"].contains(&&*guide.kind)
+/// Returns whether a node rolls the sensor over a surface, or lets somebody roll it during a contact.
+pub(super) fn rolls_along(nodes: &Nodes<'_>, guide: &Guidance) -> bool {
+    let lets_roll = || {
+        let node = nodes.node(guide.node()).filter(|_| guide.kind == "guidance")?;
+        let is_open = source(node, "gate").is_none_or(|gate| nodes.is_open_in_contact(gate));
+        Some(is_open && nodes.number(node, "angular_rad_per_s") != Some(0.0))
+    };
+    guide.kind == "follow_surface" || lets_roll() == Some(true)
 }
 
 /// Returns whether a node moves the sensor away from the object to its place of rest. Its gate may be closed.

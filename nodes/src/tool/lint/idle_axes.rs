@@ -15,18 +15,19 @@ use crate::tool::control::nodes::source;
 /// Returns the warnings about components that a projector selects and that nothing moves.
 pub(super) fn check<'a>(arm: &Arm<'a>, mode: &ModeLaw<'a>) -> Diagnostics {
     let all = projectors(&mode.nodes, &arm.twist);
-    all.iter().flat_map(|projector| idle_axes(arm, mode, projector, &dropped(mode, &all, projector))).collect()
+    all.into_iter().flat_map(|projector| idle_axes(arm, mode, projector, &dropped(arm, mode, projector))).collect()
 }
 
-/// Returns the components that another projector drops on the way from one to the arm.
-fn dropped<'a>(mode: &ModeLaw<'a>, all: &[&'a OutlinedBlock], projector: &OutlinedBlock) -> [bool; 6] {
-    let is_behind = |other: &&&OutlinedBlock| {
-        let before = source(other, "twist").map(|twist| projectors(&mode.nodes, twist)).unwrap_or_default();
-        before.iter().any(|one| one.name == projector.name)
+/// Returns the components that all readers of a projector drop.
+fn dropped(arm: &Arm<'_>, mode: &ModeLaw<'_>, projector: &OutlinedBlock) -> [bool; 6] {
+    let twist = projector.outputs.first().map(|port| &port.name);
+    let reads = |node: &&OutlinedBlock| node.wires.iter().any(|wire| Some(&wire.source) == twist);
+    let select = |node: &OutlinedBlock| {
+        let select = mode.nodes.value(node, "select").filter(|_| node.kind.text == "projector");
+        select.and_then(|select| select.value.read::<[f64; 6]>()).unwrap_or([1.0; 6])
     };
-    let select = |other: &OutlinedBlock| mode.nodes.value(other, "select")?.value.read::<[f64; 6]>();
-    let behind: Vec<[f64; 6]> = all.iter().filter(is_behind).filter_map(|other| select(other)).collect();
-    std::array::from_fn(|i| behind.iter().any(|select| select[i] == 0.0))
+    let readers: Vec<[f64; 6]> = arm.outline.nodes.iter().filter(reads).map(select).collect();
+    std::array::from_fn(|i| !readers.is_empty() && readers.iter().all(|select| select[i] == 0.0))
 }
 
 fn idle_axes<'a>(arm: &Arm<'a>, mode: &ModeLaw<'a>, projector: &'a OutlinedBlock, dropped: &[bool; 6]) -> Diagnostics {

@@ -27,16 +27,23 @@ pub(super) fn check(arm: &Arm<'_>) -> Diagnostics {
 /// Returns the warning about both positions over a pen or a cable that the bench states to be longer than the pad, where
 /// nothing holds its angle: at least one of them lies along it.
 fn over_line(arm: &Arm<'_>, mode: &ModeLaw<'_>) -> Option<Diagnostic> {
-    let is_free = line_angle(mode).is_none() && !mode.moving().any(|one| mode.quantity(one) == Some("orientation"));
+    let is_free = !mode.moving().any(|one| mode.quantity(one) == Some("orientation"));
     // How hard the sensor presses says nothing about whether the contact is centred.
     let is_press = |when: &str| arm.watched(mode, when).is_some_and(|quantity| is_force(&quantity));
     let mut exits = mode.conditions();
     let lasts = exits.all(|exit| exit.is_lost() || exit.waits() >= LONG_MS || exit.when().is_some_and(is_press));
-    if !is_free || !lasts || !arm.objects().all(is_thin) {
+    let fails_early = mode.fails().any(|exit| (1.0..LONG_MS).contains(&exit.waits()));
+    if !is_free || !lasts || fails_early || !arm.objects().all(is_thin) {
         return None;
     }
     let [x, y] = [held(mode, 0)?, held(mode, 1)?];
-    let line = shortest_line(arm, mode, y).filter(Line::is_longer)?;
+    // The line may lie along the diagonal of the pad.
+    let [width, height] = [x, y].map(|feature| mode.range(feature).map(|[from, to]| to - from));
+    let pad = libm::hypot(width?, height?);
+    let line = Line { pad, ..shortest_line(arm, mode, y)? };
+    if !line.is_longer() {
+        return None;
+    }
     let message = format!(
         "{}`{}` and `{}` are controlled over {line}: the middle of a long print says nothing about a position along it",
         mode.prefix(),

@@ -8,7 +8,7 @@ use tactflow_runtime::source::{Code, Diagnostic, Diagnostics, Edit};
 use super::arm::Arm;
 use super::gains::unfiltered;
 use super::mode_law::ModeLaw;
-use super::reach::{Unreachable, unreachable};
+use super::reach::{beside_window, unreachable_setpoint};
 use super::stability::{KEPT, is_known, over, unmeasured};
 use crate::tool::control::digits::down_to_two_digits;
 use crate::tool::control::law::Feature;
@@ -22,11 +22,15 @@ pub(super) fn check(arm: &Arm<'_>) -> Diagnostics {
     let loops = || arm.modes.iter().flat_map(|mode| mode.moving().map(move |feature| (mode, feature)));
     let of_range = |range| loops().filter_map(move |(mode, feature)| Changed::of(feature, range)?.judge(arm, mode));
     let tightest = |range| of_range(range).min_by(|(one, _), (other, _)| one.total_cmp(other));
-    let simple =
-        |range| loops().find_map(|(mode, feature)| reversed(feature, range).or_else(|| noisy(mode, feature, range)));
-    let setpoint = |range| loops().find_map(|(mode, feature)| out_of_reach(arm, mode, feature, range));
-    let first = |range| simple(range).or_else(|| setpoint(range)).or_else(|| Some(tightest(range)?.1));
-    arm.outline.live.iter().filter_map(first).collect()
+    let all = |range| {
+        let tightest = tightest(range).map(|(_, found)| found);
+        let noise = loops().find_map(|(mode, feature)| noisy(mode, feature, range));
+        let mut found: Diagnostics = noise.or(tightest).into_iter().collect();
+        found.extend(loops().find_map(|(_, feature)| reversed(feature, range)));
+        found.extend(loops().find_map(|(mode, feature)| out_of_reach(arm, mode, feature, range)).into_iter().flatten());
+        found
+    };
+    arm.outline.live.iter().flat_map(all).collect()
 }
 
 /// Returns the gain of a feature that a range is about, and its value as written.
@@ -52,9 +56,9 @@ fn with(feature: &Feature, key: &str, gain: f64) -> Feature {
 /// Returns the warning about a range that reaches down to a gain of the wrong sign.
 fn reversed(feature: &Feature, range: &OutlinedRange) -> Option<Diagnostic> {
     let ([least, _], [place, _]) = (range.range, &range.spans);
-    gain(feature, range).filter(|_| least < 0.0)?;
-    let message =
-        format!("`{}` may become {least}: the motion then increases the error of `{}`", range.name, feature.name);
+    let (key, _) = gain(feature, range).filter(|_| least < 0.0)?;
+    let what = if key == "kd" { "takes damping from the loop of" } else { "increases the error of" };
+    let message = format!("`{}` may become {least}: the motion then {what} `{}`", range.name, feature.name);
     let diagnostic = Diagnostic::new(Code::UnusualGain, place.clone(), message);
     Some(diagnostic.help("write `min = 0.0` or more").edit(Edit::Replace(place.clone(), "0.0".into())))
 }
@@ -63,41 +67,40 @@ fn reversed(feature: &Feature, range: &OutlinedRange) -> Option<Diagnostic> {
 fn noisy(mode: &ModeLaw<'_>, feature: &Feature, range: &OutlinedRange) -> Option<Diagnostic> {
     let ([_, most], [_, place]) = (range.range, &range.spans);
     gain(feature, range).filter(|(key, value)| *key == "kd" && *value < most)?;
-    let noise = |feature: &Feature| unfiltered(mode, feature, "write a smaller `max`");
+    // Of this gain, noise is amplified as much as by `kp`.
+    let good = down_to_two_digits(feature.kp * feature.period_s * std::f64::consts::FRAC_1_SQRT_2);
+    let noise = |feature: &Feature| unfiltered(mode, feature, &format!("write `max = {good}` or less"));
     let found = noise(&with(feature, "kd", most)).filter(|_| noise(feature).is_none())?;
     let message = format!("`{}` may become {most}, and then {}", range.name, found.message);
     Some(Diagnostic { span: place.clone(), message, ..found })
 }
 
-/// Returns the warning about a range of a setpoint that reaches beyond a limit, a threshold, or the pad.
-fn out_of_reach(arm: &Arm<'_>, mode: &ModeLaw<'_>, feature: &Feature, range: &OutlinedRange) -> Option<Diagnostic> {
+/// Returns the warnings about a range of a setpoint that reaches beyond a limit, a threshold, a window, or the pad.
+fn out_of_reach(arm: &Arm<'_>, mode: &ModeLaw<'_>, feature: &Feature, range: &OutlinedRange) -> Option<Diagnostics> {
     let (node, name) = range.name.split_once(".setpoint.")?;
-    if feature.compared.as_deref() != Some(node) || feature.name != name || beyond(arm, mode, feature).is_some() {
+    let is_own = feature.compared.as_deref() == Some(node) && feature.name == name;
+    if !is_own || beyond(arm, mode, feature).is_some() {
         return None;
     }
     let ends = range.range.into_iter().zip(&range.spans);
-    ends.into_iter().find_map(|(setpoint, place)| {
-        let why = beyond(arm, mode, &Feature { setpoint: Some(setpoint), ..feature.clone() })?;
-        let message = format!("`{}` may become {setpoint}, but {why}", range.name);
-        let help = format!("let the range of `{name}` end well before that");
-        Some(Diagnostic::new(Code::UnreachableSetpoint, place.clone(), message).help(help))
-    })
+    let found = ends.filter_map(|(setpoint, place)| {
+        let found = beyond(arm, mode, &Feature { setpoint: Some(setpoint), ..feature.clone() })?;
+        let message = format!("`{}` may become {setpoint}: {}", range.name, found.message);
+        Some(Diagnostic { span: place.clone(), message, ..found })
+    });
+    Some(found.collect())
 }
 
-/// Returns why the setpoint of a feature is out of reach.
-fn beyond(arm: &Arm<'_>, mode: &ModeLaw<'_>, feature: &Feature) -> Option<String> {
-    if let Some(why) = unreachable(arm, mode, feature) {
-        return Some(match why {
-            Unreachable::AboveLimit { most, key } => format!("the limit `{key}` is {most}"),
-            Unreachable::BelowThreshold { threshold, node, what } => {
-                format!("`{node}` drops {what} below {threshold}: the contact is lost before it is reached")
-            }
-        });
-    }
-    let setpoint = feature.setpoint.filter(|_| matches!(mode.quantity(feature), Some("x" | "y")))?;
-    let [from, to] = mode.range(feature)?;
-    let is_beside = !(from..=to).contains(&setpoint);
-    is_beside.then(|| format!("the pad measures it from {from} to {to} m"))
+/// Returns the warning about a setpoint that is out of reach.
+fn beyond(arm: &Arm<'_>, mode: &ModeLaw<'_>, feature: &Feature) -> Option<Diagnostic> {
+    let known = unreachable_setpoint(arm, mode, feature).or_else(|| beside_window(mode, feature));
+    known.or_else(|| {
+        let setpoint = feature.setpoint.filter(|_| matches!(mode.quantity(feature), Some("x" | "y")))?;
+        let [from, to] = mode.range(feature).filter(|[from, to]| !(*from..=*to).contains(&setpoint))?;
+        let message = format!("the pad measures `{}` from {from} to {to} m", feature.name);
+        let help = format!("let the range end well inside of {from} to {to}");
+        Some(Diagnostic::new(Code::UnreachableSetpoint, mode.place_of_setpoint(feature)?, message).help(help))
+    })
 }
 
 /// A feature with a gain that may change.

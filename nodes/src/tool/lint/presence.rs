@@ -24,7 +24,10 @@ pub(super) fn check(arm: &Arm<'_>) -> Diagnostics {
             let Some((gate, why, mend)) = barred(arm, mode, feature) else { continue };
             let message = format!("`{}` has gains, but it is never present: it passes `{gate}`, {why}", feature.name);
             let help = mend.unwrap_or_else(|| {
-                format!("let a gate of `{}` open in a mode that selects its column, or remove its column, its gains and its wire", feature.name)
+                format!(
+                    "let a gate of `{}` open in a mode that selects its column, or remove its column, its gains and its wire",
+                    feature.name
+                )
             });
             found.push(Diagnostic::new(Code::UnusedColumn, mode.place_of_column(feature), message).help(help));
         }

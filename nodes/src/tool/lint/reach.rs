@@ -59,8 +59,9 @@ pub(super) enum Unreachable<'a> {
     BelowThreshold {
         /// The smallest value that counts, in the unit of the setpoint.
         threshold: f64,
-        /// The node that drops smaller ones.
+        /// The node that drops smaller ones, and its key.
         node: &'a str,
+        key: &'static str,
         /// What it drops.
         what: &'static str,
     },
@@ -88,10 +89,15 @@ pub(super) fn unreachable<'a>(arm: &Arm<'_>, mode: &ModeLaw<'a>, feature: &Featu
         return Some(Unreachable::AboveLimit { most, key });
     }
     let dropped = DROPPED.iter().find(|dropped| dropped.quantity == quantity)?;
-    let (threshold, node) = least_felt(mode, feature, dropped)?;
+    let (threshold, node, key) = least_felt(mode, feature, dropped)?;
     // A tactel at the threshold counts, and the mean of several that are still there lies above it.
     let is_below = setpoint < threshold || quantity == "pressure" && setpoint == threshold;
-    (is_below && !lets_go(arm, mode)).then_some(Unreachable::BelowThreshold { threshold, node, what: dropped.what })
+    (is_below && !lets_go(arm, mode)).then_some(Unreachable::BelowThreshold {
+        threshold,
+        node,
+        key,
+        what: dropped.what,
+    })
 }
 
 /// Returns the limit that a setpoint nearly reaches, in a mode that does not end before.
@@ -106,7 +112,7 @@ fn near_limit<'a>(arm: &Arm<'_>, mode: &ModeLaw<'a>, feature: &Feature) -> Optio
 }
 
 /// Returns the warning about a setpoint of a force that the task never reaches.
-fn unreachable_setpoint(arm: &Arm<'_>, mode: &ModeLaw<'_>, feature: &Feature) -> Option<Diagnostic> {
+pub(super) fn unreachable_setpoint(arm: &Arm<'_>, mode: &ModeLaw<'_>, feature: &Feature) -> Option<Diagnostic> {
     let (name, setpoint) = (&feature.name, feature.setpoint?);
     let (message, help) = match unreachable(arm, mode, feature).or_else(|| near_limit(arm, mode, feature))? {
         Unreachable::AboveLimit { most, key } => {
@@ -117,7 +123,7 @@ fn unreachable_setpoint(arm: &Arm<'_>, mode: &ModeLaw<'_>, feature: &Feature) ->
                 format!("write a setpoint well below {most}, or raise `{key}` in [limits]"),
             )
         }
-        Unreachable::BelowThreshold { threshold, node, what } => (
+        Unreachable::BelowThreshold { threshold, node, key, what } => (
             format!(
                 "the setpoint of `{name}` is {setpoint}, but `{node}` drops {what} below {threshold}: the contact is lost \
                  before it is reached"
@@ -125,8 +131,8 @@ fn unreachable_setpoint(arm: &Arm<'_>, mode: &ModeLaw<'_>, feature: &Feature) ->
             {
                 let three = (3e6 * threshold).round() / 1e6;
                 let limit = arm.force_limit(mode, mode.quantity(feature)?).map_or(f64::INFINITY, |(most, _)| most);
-                let example = if three < limit { format!(", for example {three}") } else { String::new() };
-                format!("write a setpoint well above {threshold}{example}, or a smaller threshold of `{node}`")
+                let example = if three < NEAR * limit { format!(", for example {three}") } else { String::new() };
+                format!("write a setpoint well above {threshold}{example}, or a smaller `{key}` of `{node}`")
             },
         ),
     };
@@ -134,7 +140,7 @@ fn unreachable_setpoint(arm: &Arm<'_>, mode: &ModeLaw<'_>, feature: &Feature) ->
 }
 
 /// Returns the warning about a place outside of the window in which it is measured.
-fn beside_window(mode: &ModeLaw<'_>, feature: &Feature) -> Option<Diagnostic> {
+pub(super) fn beside_window(mode: &ModeLaw<'_>, feature: &Feature) -> Option<Diagnostic> {
     let axis = ["x", "y"].iter().position(|axis| mode.quantity(feature) == Some(axis))?;
     let windows = mode.nodes.upstream(feature.measured.as_deref()?);
     let window = windows.into_iter().find(|node| node.kind.text == "image_window")?;
@@ -159,10 +165,10 @@ fn lets_go(arm: &Arm<'_>, mode: &ModeLaw<'_>) -> bool {
     mode.releases().next().is_some() || mode.lost().filter_map(Exit::to).any(|to| arm.leaves(to))
 }
 
-/// Returns the smallest value that counts upstream of a feature, and the node that drops smaller ones.
-fn least_felt<'a>(mode: &ModeLaw<'a>, feature: &Feature, dropped: &Dropped) -> Option<(f64, &'a str)> {
+/// Returns the smallest value that counts upstream of a feature, the node that drops smaller ones, and its key.
+fn least_felt<'a>(mode: &ModeLaw<'a>, feature: &Feature, dropped: &Dropped) -> Option<(f64, &'a str, &'static str)> {
     let nodes = mode.nodes.upstream(feature.measured.as_deref()?);
     let node = nodes.into_iter().find(|node| node.kind.text == dropped.kind)?;
-    let value = dropped.keys.iter().find_map(|key| mode.nodes.number(node, key))?;
-    Some((value, &node.name))
+    let (value, key) = dropped.keys.iter().find_map(|key| Some((mode.nodes.number(node, key)?, *key)))?;
+    Some((value, &node.name, key))
 }

@@ -27,7 +27,8 @@ pub(super) fn check(arm: &Arm<'_>, mode: &ModeLaw<'_>) -> Option<Diagnostic> {
         mode.prefix(),
         COMPONENTS[i]
     );
-    let help = "control the pressure along `vz` in this mode, or let nothing roll: select 0 for `wx` and `wy` of all that moves the sensor";
+    let help = "control the pressure along `vz` in this mode, or let nothing roll: select 0 for `wx` and `wy` of all that moves \
+                the sensor";
     Some(Diagnostic::new(Code::UnforcedRolling, place, message).help(help))
 }
 
@@ -40,17 +41,18 @@ fn roller(mode: &ModeLaw<'_>) -> Option<(String, usize, Range<usize>)> {
         let i = rolls(&feature.column).filter(|_| is_place)?;
         Some((feature.name.clone(), i, mode.place_of_column(feature)))
     });
+    let is_still = mode.law.constants.iter().all(|constant| constant.twist[2] == 0.0);
     let has_contact = || mode.exits("on_lost").next().is_some();
     // A generated motion, such as a sine, or a motion over a surface.
     let generated = || {
-        let is_roller = |guide: &&Guidance| (rolls_along(guide) || is_composed(guide)) && has_contact();
+        let rolls = |guide: &&Guidance| rolls_along(&mode.nodes, guide) && is_still;
+        let is_roller = |guide: &&Guidance| (rolls(guide) || is_composed(guide)) && has_contact();
         mode.law.guidance.iter().filter(is_roller).find_map(|guide| {
             let i = [3, 4].into_iter().find(|i| guide.passes[*i])?;
             Some((guide.node().to_owned(), i, mode.nodes.node(guide.node())?.span.clone()))
         })
     };
     let constant = || {
-        let is_still = mode.law.constants.iter().all(|constant| constant.twist[2] == 0.0);
         mode.law.constants.iter().filter(|_| is_still && has_contact()).find_map(|constant| {
             Some((constant.node.clone(), rolls(&constant.twist)?, mode.place(&constant.node, "twist")))
         })

@@ -226,7 +226,7 @@ fn without_gain(mode: &ModeLaw<'_>, feature: &Feature, loops: &[Loop], diagnosti
             .edit(Edit::Replace(place, format!("{ki:?}")));
     }
     if let Some([kp, ki]) = both(feature, loops) {
-        let help = format!("write `kp = {kp}` and `ki = {ki}` or less in the gains of `{}`", feature.name);
+        let help = format!("write `kp = {kp}` and `ki = {ki}` in the gains of `{}`", feature.name);
         let edits = [("kp", kp), ("ki", ki)];
         return edits.into_iter().fold(diagnostic.help(help), |diagnostic, (key, gain)| {
             diagnostic.edit(Edit::Replace(mode.place_of_gain(feature, key), format!("{gain:?}")))
@@ -242,13 +242,16 @@ fn without_gain(mode: &ModeLaw<'_>, feature: &Feature, loops: &[Loop], diagnosti
 /// Returns the largest `kp` that keeps the margins of all loops with some integral, and that integral: where the filters
 /// are slow, a smaller `kp` alone leaves too much of it.
 fn both(feature: &Feature, loops: &[Loop]) -> Option<[f64; 2]> {
+    if feature.ki == 0.0 || feature.kd != 0.0 {
+        return None;
+    }
     let smaller = |ratio: f64| std::iter::successors(Some(ratio), move |share| Some(share * ratio)).take(20);
     let is_good = |factor: f64, share: f64| {
         let judged = |around: &Loop| judge_loop(feature, &around.times(factor).with_integral_share(share));
         loops.iter().all(|around| judged(around).is_good())
     };
     let found = smaller(0.8).find_map(|factor| Some([factor, smaller(0.7).find(|share| is_good(factor, *share))?]));
-    let [factor, share] = found.filter(|_| feature.ki > 0.0 && feature.kd == 0.0)?;
+    let [factor, share] = found?;
     Some([feature.kp * factor, feature.ki * factor * share].map(down_to_two_digits))
 }
 

@@ -17,6 +17,8 @@ const AMPLITUDES: [[f64; 4]; 2] = [[0.3e-3, 1.2e-3, 2.4e-3, 4.8e-3], [0.01, 0.02
 const AGREES: f64 = 0.2;
 /// A motion that is so many times as large as another one is larger [1].
 const FURTHER: f64 = 1.3;
+/// Ratio of two amplitudes of which the second one is worth a run: more than [`FURTHER`] [1].
+const NOTICEABLY: f64 = 1.5;
 /// Change of the response from one amplitude to the next with which the larger one counts [1].
 const MAX_CHANGE: f64 = 0.5;
 /// The component that presses, and lifts off.
@@ -105,16 +107,15 @@ fn runs(experiment: &Experiment<'_>, component: usize, shell: &Shell) -> Result<
     let unit = if component < 3 { "m" } else { "rad" };
     let mut room: Option<Room> = None;
     for wanted in AMPLITUDES[component / 3] {
-        let least = wanted.min(FURTHER * found.amplitude);
-        if let Some(room) = room.as_ref().filter(|room| room.amplitude < least) {
+        let amplitude = room.as_ref().map_or(wanted, |room| down_to_two_digits(room.amplitude.min(wanted)));
+        if let Some(room) = room.as_ref().filter(|_| amplitude < NOTICEABLY * found.amplitude) {
             let why = format!(
-                "a test signal of more than {} {unit} would come near the limit `{}`; raise it, or lower the setpoint",
+                "a test signal of more than {} {unit} would come near the limit {}; raise it, or lower the setpoint",
                 found.amplitude, room.limit
             );
             found.stopped = Some(Refusal { why, kind: Unknown::Hidden });
             break;
         }
-        let amplitude = room.as_ref().map_or(wanted, |room| down_to_two_digits(room.amplitude.min(wanted)));
         found.amplitude = amplitude;
         shell.say_beside(&format!("`{}`: a test signal of {amplitude} {unit}", experiment.feature.name));
         let (why, kind) = match experiment.run(component, amplitude)? {

@@ -99,12 +99,18 @@ impl Experiment<'_> {
         let column = self.feature.column[component];
         let outcome = run(&mut engine, &options, &mut |engine| {
             let read = |port| engine.bus().scalar(port).unwrap_or(f64::NAN);
+            let before = stay.rows().len();
             stay.see(self.task.mode(engine), || [read(control) * column, read(all)]);
-            if (settled..wanted).contains(&stay.rows().len()) {
+            let rows = stay.rows().len();
+            if (settled..wanted).contains(&rows) {
                 limits.see(engine);
             }
-            if (settled - calm..wanted).contains(&stay.rows().len()) {
-                loads.see(engine, stay.rows().len() < settled);
+            // After a bounce, the stay begins again.
+            if rows < before {
+                loads.clear();
+            }
+            if rows != before && (settled - calm..wanted).contains(&rows) {
+                loads.see(engine, rows < settled);
             }
         });
         let outcome = outcome.map_err(|error| format!("the run cannot start: {error}"))?;

@@ -14,13 +14,12 @@ const MOST: f64 = 0.9;
 #[derive(Debug)]
 struct Load {
     image: PortId,
-    /// `node.key`.
     limit: String,
     /// What the limit counts, of an image.
     of: fn(&Image) -> f64,
     /// The limit, in the unit of the image.
     ceiling: f64,
-    /// The largest one before the test signal, and the largest one [1]. Both contain the noise.
+    /// The largest one before the test signal, and the largest one during it [1]. Both contain the noise.
     calm: f64,
     most: f64,
 }
@@ -39,11 +38,11 @@ const COUNTS: [Count; 2] =
 pub(super) struct Room {
     /// Its largest amplitude with which no load comes near a limit [m] or [rad].
     pub(super) amplitude: f64,
-    /// The limit that decides, as `node.key`.
+    /// The limit that decides, for a sentence.
     pub(super) limit: String,
 }
 
-/// The loads of a run under all limits of a force.
+/// The loads of a run under all limits of a force, those of all pads of the graph.
 #[derive(Debug)]
 pub(super) struct Loads {
     loads: Vec<Load>,
@@ -60,11 +59,16 @@ impl Loads {
             let keys = COUNTS.iter().flat_map(|Count { keys, of }| keys.map(|key| (key, *of)));
             keys.filter_map(|(key, of)| {
                 let (image, ceiling) = (image?, nodes.number(node, key)?);
-                Some(Load { image, limit: format!("{}.{key}", node.name), of, ceiling, calm: 0.0, most: 0.0 })
+                Some(Load { image, limit: format!("`{key}` of `{}`", node.name), of, ceiling, calm: 0.0, most: 0.0 })
             })
             .collect::<Vec<_>>()
         });
         Self { loads: loads.collect() }
+    }
+
+    /// Forgets what was read.
+    pub(super) fn clear(&mut self) {
+        self.loads.iter_mut().for_each(|load| (load.calm, load.most) = (0.0, 0.0));
     }
 
     /// Reads the loads of the last tick, before the test signal or during it.
@@ -79,11 +83,19 @@ impl Loads {
     /// Returns the room that the limits leave, after a motion with this amplitude; `None` if it has moved no load.
     pub(super) fn room(&self, amplitude: f64) -> Option<Room> {
         let each = self.loads.iter().filter_map(|load| {
-            let more = ((MOST - load.calm) / (load.most - load.calm)).max(0.0);
-            (load.most > load.calm).then(|| Room { amplitude: amplitude * more, limit: load.limit.clone() })
+            Some(Room { amplitude: amplitude * further(load.calm, load.most)?, limit: load.limit.clone() })
         });
         each.min_by(|one, other| one.amplitude.total_cmp(&other.amplitude))
     }
+}
+
+/// Returns the largest motion that keeps a load below its limit, as a multiple of one that has moved it from `calm` to
+/// `most` of this limit; `None` if that did not move it.
+fn further(calm: f64, most: f64) -> Option<f64> {
+    if calm >= MOST {
+        return Some(0.0);
+    }
+    (most > calm).then(|| (MOST - calm) / (most - calm))
 }
 
 fn port(engine: &Engine, name: &str) -> Option<PortId> {
@@ -97,4 +109,17 @@ fn sum(image: &Image) -> f64 {
 
 fn peak(image: &Image) -> f64 {
     image.cells().iter().copied().fold(0.0, f32::max).into()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_motion_grows_until_the_load_comes_near_its_limit() {
+        let near = |found: Option<f64>, expected: f64| found.is_some_and(|found| (found - expected).abs() < 1e-9);
+        assert!(near(further(0.5, 0.6), 4.0) && near(further(0.5, 0.95), 0.4 / 0.45));
+        assert!(near(further(0.95, 0.95), 0.0) && near(further(0.95, 0.6), 0.0), "it is there already");
+        assert_eq!([further(0.5, 0.5), further(0.5, 0.4)], [None; 2], "the motion does not change the load");
+    }
 }
