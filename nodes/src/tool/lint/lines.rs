@@ -39,13 +39,12 @@ fn over_line(arm: &Arm<'_>, mode: &ModeLaw<'_>) -> Option<Diagnostic> {
     let [x, y] = [held(mode, 0)?, held(mode, 1)?];
     // The line may lie along the diagonal of the pad.
     let [width, height] = [x, y].map(|feature| mode.range(feature).map(|[from, to]| to - from));
-    let pad = libm::hypot(width?, height?);
-    let line = Line { pad, ..shortest_line(arm, mode, y)? };
-    if !line.is_longer() {
-        return None;
-    }
+    let diagonal = libm::hypot(width?, height?);
+    let Line { shape, length, .. } = shortest_line(arm, mode, y).filter(|line| line.length > diagonal)?;
+    let [length, diagonal] = [length, diagonal].map(|length| (length * 1e3).round());
     let message = format!(
-        "{}`{}` and `{}` are controlled over {line}: the middle of a long print says nothing about a position along it",
+        "{}`{}` and `{}` are controlled over the {shape} of {length} mm, which is longer than the {diagonal} mm of the \
+         diagonal over which the pad measures places: the middle of a long print says nothing about a position along it",
         mode.prefix(),
         x.name,
         y.name

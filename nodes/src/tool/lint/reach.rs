@@ -128,15 +128,20 @@ pub(super) fn unreachable_setpoint(arm: &Arm<'_>, mode: &ModeLaw<'_>, feature: &
                 "the setpoint of `{name}` is {setpoint}, but `{node}` drops {what} below {threshold}: the contact is lost \
                  before it is reached"
             ),
-            {
-                let three = (3e6 * threshold).round() / 1e6;
-                let limit = arm.force_limit(mode, mode.quantity(feature)?).map_or(f64::INFINITY, |(most, _)| most);
-                let example = if three < NEAR * limit { format!(", for example {three}") } else { String::new() };
-                format!("write a setpoint well above {threshold}{example}, or a smaller `{key}` of `{node}`")
-            },
+            format!(
+                "write a setpoint well above {threshold}{}, or a smaller `{key}` of `{node}`",
+                example(arm, mode, feature, threshold).unwrap_or_default()
+            ),
         ),
     };
     Some(Diagnostic::new(Code::UnreachableSetpoint, mode.place_of_setpoint(feature)?, message).help(help))
+}
+
+/// Returns a setpoint well above a threshold for a help; `None` if it comes near a limit.
+fn example(arm: &Arm<'_>, mode: &ModeLaw<'_>, feature: &Feature, threshold: f64) -> Option<String> {
+    let setpoint = (3e6 * threshold).round() / 1e6;
+    let limit = arm.force_limit(mode, mode.quantity(feature)?);
+    limit.is_none_or(|(most, _)| setpoint < NEAR * most).then(|| format!(", for example {setpoint}"))
 }
 
 /// Returns the warning about a place outside of the window in which it is measured.
