@@ -107,8 +107,9 @@ fn runs(experiment: &Experiment<'_>, component: usize, shell: &Shell) -> Result<
     let unit = if component < 3 { "m" } else { "rad" };
     let mut room: Option<Room> = None;
     for wanted in AMPLITUDES[component / 3] {
-        let amplitude = room.as_ref().map_or(wanted, |room| down_to_two_digits(room.amplitude.min(wanted)));
-        if let Some(room) = room.as_ref().filter(|_| amplitude < NOTICEABLY * found.amplitude) {
+        let tight = room.as_ref().filter(|room| room.amplitude < wanted);
+        let amplitude = tight.map_or(wanted, |room| down_to_two_digits(room.amplitude));
+        if let Some(room) = tight.filter(|_| amplitude < NOTICEABLY * found.amplitude) {
             let why = format!(
                 "a test signal of more than {} {unit} would come near the limit {}; raise it, or lower the setpoint",
                 found.amplitude, room.limit
