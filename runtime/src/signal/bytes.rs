@@ -17,8 +17,8 @@
 use nalgebra::{Matrix3, Rotation3, Translation3, Vector6};
 
 use super::{
-    Arenas, Features, Flag, Image, Jacobian, Joints, Kind, Mask, Pose, Region, Regions, Run, Scalar, Shape, Signal,
-    Twist, VectorImage,
+    Arenas, Cells, Features, Flag, Image, Jacobian, Joints, Kind, Mask, Pose, Region, Regions, Run, Scalar, Shape,
+    Signal, Twist, VectorImage,
 };
 
 /// Reads numbers from the front of bytes. Every method returns `None` when too few are left.
@@ -98,6 +98,12 @@ fn put_count(out: &mut Vec<u8>, count: usize) {
     out.extend_from_slice(&(count as u32).to_le_bytes());
 }
 
+fn write_cells<T: bytemuck::Pod + Default>(image: &Cells<T>, out: &mut Vec<u8>) {
+    put_count(out, image.rows());
+    put_count(out, image.cols());
+    out.extend_from_slice(bytemuck::cast_slice(image.cells()));
+}
+
 fn put_f64s(out: &mut Vec<u8>, values: &[f64]) {
     out.extend_from_slice(bytemuck::cast_slice(values));
 }
@@ -119,18 +125,8 @@ impl Arenas {
                     put_f64s(out, &[value.unwrap_or_default()]);
                 }
             }
-            Kind::Image => {
-                let image = &Image::arena(self)[slot];
-                put_count(out, image.rows());
-                put_count(out, image.cols());
-                out.extend_from_slice(bytemuck::cast_slice(image.cells()));
-            }
-            Kind::VectorImage => {
-                let image = &VectorImage::arena(self)[slot];
-                put_count(out, image.rows());
-                put_count(out, image.cols());
-                out.extend_from_slice(bytemuck::cast_slice(image.cells()));
-            }
+            Kind::Image => write_cells(&Image::arena(self)[slot], out),
+            Kind::VectorImage => write_cells(&VectorImage::arena(self)[slot], out),
             Kind::Mask => {
                 let mask = &Mask::arena(self)[slot];
                 put_count(out, mask.rows());
@@ -172,8 +168,8 @@ impl Arenas {
                     values?.into_iter().map(|(is_present, value)| is_present.then_some(value)).collect();
                 Features::arena_mut(self)[slot].fill(&values);
             }
-            Kind::Image => read_image(&mut Image::arena_mut(self)[slot], bytes)?,
-            Kind::VectorImage => read_vector_image(&mut VectorImage::arena_mut(self)[slot], bytes)?,
+            Kind::Image => read_cells(&mut Image::arena_mut(self)[slot], bytes)?,
+            Kind::VectorImage => read_cells(&mut VectorImage::arena_mut(self)[slot], bytes)?,
             Kind::Mask => {
                 let (rows, cols) = bytes.size(|rows, cols| rows.checked_mul(8 * cols.div_ceil(64)))?;
                 let mask = &mut Mask::arena_mut(self)[slot];
@@ -240,27 +236,13 @@ fn read_regions(regions: &mut Regions, bytes: &mut ByteReader<'_>) -> Option<()>
     Some(())
 }
 
-fn read_image(image: &mut Image, bytes: &mut ByteReader<'_>) -> Option<()> {
-    let (rows, cols) = bytes.size(|rows, cols| rows.checked_mul(cols)?.checked_mul(4))?;
+fn read_cells<T: bytemuck::Pod + Default>(image: &mut Cells<T>, bytes: &mut ByteReader<'_>) -> Option<()> {
+    let (rows, cols) = bytes.size(|rows, cols| rows.checked_mul(cols)?.checked_mul(size_of::<T>()))?;
     if (image.rows(), image.cols()) != (rows, cols) {
-        *image = Image::zeros(rows, cols);
+        *image = Cells::zeros(rows, cols);
     }
-    let cells = bytes.take(4 * rows * cols)?;
-    for (cell, bytes) in image.cells_mut().iter_mut().zip(cells.chunks_exact(4)) {
-        *cell = f32::from_le_bytes(bytes.try_into().ok()?);
-    }
-    Some(())
-}
-
-fn read_vector_image(image: &mut VectorImage, bytes: &mut ByteReader<'_>) -> Option<()> {
-    let (rows, cols) = bytes.size(|rows, cols| rows.checked_mul(cols)?.checked_mul(12))?;
-    if (image.rows(), image.cols()) != (rows, cols) {
-        *image = VectorImage::zeros(rows, cols);
-    }
-    let cells = bytes.take(12 * rows * cols)?;
-    for (value, bytes) in image.cells_mut().as_flattened_mut().iter_mut().zip(cells.chunks_exact(4)) {
-        *value = f32::from_le_bytes(bytes.try_into().ok()?);
-    }
+    let cells = bytes.take(size_of::<T>() * rows * cols)?;
+    bytemuck::cast_slice_mut(image.cells_mut()).copy_from_slice(cells);
     Some(())
 }
 

@@ -4,6 +4,7 @@
 //! place. The shape fixes the size of a value, so every slot is allocated at load and never later.
 
 mod bytes;
+mod cells;
 mod decimal;
 mod features;
 mod freshness;
@@ -21,6 +22,7 @@ mod unit_size;
 mod vector_image;
 
 pub(crate) use bytes::{ByteReader, put_text};
+pub use cells::Cells;
 pub use features::{Component, Feature, Features, FeaturesShape};
 pub use freshness::{Freshness, Mark, Stamp};
 pub use image::{Image, ImageShape};
