@@ -26,6 +26,8 @@ use sinking::Sinking;
 use tactel_curves::TactelCurves;
 use tare::{Averages, Rules};
 
+use super::common::halves::FREE;
+
 /// Converts the reading of each tactel to a force, by a line or by the curves of a calibration file.
 ///
 /// Every tactel of a foam sensor has its own zero and its own squashed (saturating) curve (paper section III, fig. 1).
@@ -149,9 +151,7 @@ pub struct Params {
     max_rise: Option<f64>,
 }
 
-/// A reading that is off its zero by that many times the noise is no noise.
-const FREE: f64 = 8.0;
-/// The same for a pad without noise, as a fraction of its `tare_bound`.
+/// [`FREE`] for a pad without noise, as a fraction of its `tare_bound`.
 const MIN_FREE: f64 = 0.1;
 
 /// What `calibrate` reads.

@@ -9,6 +9,8 @@ use tactflow_runtime::node::{Mistake, State};
 use tactflow_runtime::signal::ImageShape;
 
 use super::repair::{BadTactel, Flaw};
+use crate::calibration::samples::median;
+use crate::touch::common::halves::Halves;
 
 /// Smallest number of frames of a self-test: each half keeps two readings of each tactel.
 const MIN_FRAMES: usize = 8;
@@ -16,8 +18,6 @@ const MIN_FRAMES: usize = 8;
 const MAX_CHANGES_OF_A_CONSTANT: u32 = 2;
 /// A tactel with that many times the noise of the pad is noisy.
 const NOISY: f64 = 8.0;
-/// Number of standard deviations of the difference of two means that are no chance.
-const SIGNIFICANT: f64 = 6.0;
 
 /// The result of a self-test.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -180,7 +180,7 @@ impl RestTest {
     /// Adds a frame at rest. `is_dead` are the tactels that the calibration excludes. Returns whether this was the last
     /// one, so that there is a verdict.
     pub(super) fn add(&self, cells: &[f32], is_dead: impl Fn(usize) -> bool, rest: &mut Rest) -> bool {
-        let half = usize::from(rest.frames >= self.frames / 2);
+        let half = Halves::of(self.frames).half(rest.frames);
         for ((tactel, cell), zero) in rest.tactels.iter_mut().zip(cells).zip(&rest.zeros) {
             tactel.halves[half].add(f64::from(*cell) - f64::from(*zero));
             tactel.changes += u32::from(rest.frames > 0 && *cell != tactel.last);
@@ -202,9 +202,9 @@ impl RestTest {
 
     /// Returns what the readings of tactel `i` amount to.
     fn reading(&self, i: usize, rest: &Rest) -> Reading {
-        let first = self.frames / 2;
+        let Halves([first, second]) = Halves::of(self.frames);
         let [early, late] = &rest.tactels[i].halves;
-        let ([m1, v1], [m2, v2]) = (early.trimmed(first), late.trimmed(self.frames - first));
+        let ([m1, v1], [m2, v2]) = (early.trimmed(first), late.trimmed(second));
         Reading { shift: 0.5 * (m1 + m2), noise: (0.5 * (v1 + v2)).sqrt(), drift: m2 - m1 }
     }
 
@@ -255,14 +255,14 @@ impl RestTest {
     /// Returns what is wrong with a tactel, in a pad whose sound tactels have noise.
     fn flaw(&self, i: usize, rest: &Rest) -> Option<Flaw> {
         let (tactel, reading) = (&rest.tactels[i], self.reading(i, rest));
-        let chance = rest.noise * (4.0 / self.frames as f64).sqrt();
+        let largest_drift = Halves::of(self.frames).largest_drift(rest.noise * rest.noise);
         if tactel.changes <= MAX_CHANGES_OF_A_CONSTANT {
             return Some(if tactel.last == 0.0 { Flaw::Dead } else { Flaw::Stuck(tactel.last) });
         }
         if reading.noise > NOISY * rest.noise {
             return Some(Flaw::Noisy(reading.noise));
         }
-        (reading.drift.abs() > SIGNIFICANT * chance).then_some(Flaw::Drifting(reading.drift))
+        (reading.drift.abs() > largest_drift).then_some(Flaw::Drifting(reading.drift))
     }
 
     /// Sets the zeros: those of sound tactels if the zeros are compared, and those of bad ones in any case, so that a bad
@@ -295,12 +295,6 @@ impl RestTest {
         let is_side = |a: &BadTactel, b: &BadTactel| a.sides.contains(&Some(b.at as u32));
         bad.iter().find_map(|a| bad.iter().find(|b| is_side(a, b)).map(|b| [a.at, b.at]))
     }
-}
-
-/// Returns the median of some numbers, 0 for none; it sorts them partly.
-fn median(numbers: &mut [f64]) -> f64 {
-    let middle = numbers.len() / 2;
-    if numbers.is_empty() { 0.0 } else { *numbers.select_nth_unstable_by(middle, f64::total_cmp).1 }
 }
 
 #[cfg(test)]

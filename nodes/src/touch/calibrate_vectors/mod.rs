@@ -9,6 +9,9 @@ use tactflow_runtime::node::{
 };
 use tactflow_runtime::signal::{Flag, ImageShape, Unit, VectorImage, VectorImageShape};
 
+use super::common::halves::{FREE, Halves};
+use crate::calibration::samples::median;
+
 /// Converts the readings of a pad with three axes to forces [N]: `force = gain (value - zero)`, along x, y and z.
 ///
 /// **At rest.** The first `rest_frames` frames show the zero of each axis of each tactel, while nothing may touch the pad.
@@ -74,7 +77,7 @@ pub struct State {
     rest: Rest,
     /// The zero of each axis of each tactel [unit of the input].
     zeros: Vec<f32>,
-    /// Mean noise of an axis at rest [unit of the input].
+    /// Noise of an axis at rest, as the rms over all tactels and axes [unit of the input].
     noise: f64,
 }
 
@@ -111,10 +114,6 @@ struct Rest {
     sorted: Vec<f64>,
 }
 
-/// Greatest difference of the two means of a steady value [standard deviations of the difference].
-const SIGNIFICANT: f64 = 6.0;
-/// Greatest reading of a pad that nothing touches [standard deviations of the noise].
-const FREE: f64 = 8.0;
 /// One in so many values of an axis may be dead.
 const DEAD_FRACTION: usize = 50;
 /// Smallest number of frames at rest, if there are any.
@@ -212,14 +211,13 @@ impl CalibrateVectors {
             rest.first.copy_from_slice(values);
             rest.sums.fill([[0.0; 2]; 2]);
         }
-        let [first, second] = self.halves();
-        let half = usize::from(frames >= first);
+        let half = self.halves().half(frames);
         for ((sums, value), first) in rest.sums.iter_mut().zip(values).zip(&rest.first) {
             let difference = f64::from(value - first);
             sums[half][0] += difference;
             sums[half][1] += difference * difference;
         }
-        if frames + 1 < first + second {
+        if frames + 1 < self.params.rest_frames {
             rest.phase = Phase::Resting { frames: frames + 1, is_second };
             return;
         }
@@ -241,9 +239,9 @@ impl CalibrateVectors {
 
     /// Returns the mean and the variance of a value in both halves.
     fn judged(&self, sums: &[[f64; 2]; 2]) -> [[f64; 2]; 2] {
-        let halves = self.halves();
+        let Halves(frames) = self.halves();
         [0, 1].map(|half| {
-            let count = halves[half] as f64;
+            let count = frames[half] as f64;
             let mean = sums[half][0] / count;
             [mean, (sums[half][1] / count - mean * mean).max(0.0)]
         })
@@ -252,17 +250,15 @@ impl CalibrateVectors {
     /// Returns what is wrong with the frames at rest.
     fn flaw(&self, rest: &mut Rest) -> Option<Flaw> {
         let variance = |sums: &[[f64; 2]; 2]| self.judged(sums).iter().map(|[_, v]| 0.5 * v).sum::<f64>();
-        let mut medians = [0.0; 3];
-        for (axis, median) in medians.iter_mut().enumerate() {
+        let medians: [f64; 3] = std::array::from_fn(|axis| {
             rest.sorted.clear();
             rest.sorted.extend(rest.sums.iter().skip(axis).step_by(3).map(variance));
-            rest.sorted.sort_unstable_by(f64::total_cmp);
-            *median = rest.sorted[rest.sorted.len() / 2];
-        }
-        let [first, second] = self.halves().map(|frames| frames as f64);
+            median(&mut rest.sorted)
+        });
+        let most = medians.map(|median| self.halves().largest_drift(median));
         let is_unsteady = |(i, sums): (usize, &[[f64; 2]; 2])| {
             let [[m1, _], [m2, _]] = self.judged(sums);
-            (m2 - m1).abs() > SIGNIFICANT * (medians[i % 3] / first + medians[i % 3] / second).sqrt()
+            (m2 - m1).abs() > most[i % 3]
         };
         if let Some(value) = rest.sums.iter().enumerate().position(is_unsteady) {
             return Some(Flaw::Unsteady(value));
@@ -299,10 +295,9 @@ impl CalibrateVectors {
         }
     }
 
-    /// Returns the number of frames of both halves of the rest.
-    const fn halves(&self) -> [usize; 2] {
-        let first = self.params.rest_frames / 2;
-        [first, self.params.rest_frames - first]
+    /// Returns the halves of the rest.
+    const fn halves(&self) -> Halves {
+        Halves::of(self.params.rest_frames)
     }
 
     /// Checks that nothing touches the pad: no reading is off its zero by more than noise.

@@ -1,5 +1,7 @@
 //! What the nodes of this folder share.
 
+pub(super) mod halves;
+
 use tactflow_runtime::node::{Mistake, Mistakes};
 use tactflow_runtime::signal::{Grid, ImageShape};
 
