@@ -186,7 +186,7 @@ fn check_modes(
     let contact = ContactPorts::new(net);
     let generators = Generators::new(net, &contact, &motions);
     check::absent::check(&modes, &reads, &freezes, diagnostics);
-    check::overlap::check(net, &modes, diagnostics);
+    check::overlap::check(net, &readings, &modes, diagnostics);
     check::motion::check(net, &contact, &modes, &generators, diagnostics);
     check::late::check(&modes, period, diagnostics);
     check::immediate::check(net, &modes, period, diagnostics);

@@ -1,5 +1,6 @@
 //! Checks that two exits of a mode cannot hold at once without a priority.
 
+use super::readings::Readings;
 use crate::graph::net::Net;
 use crate::graph::plan::{Condition, PlannedExit, PlannedMode, Test};
 use crate::graph::syntax::{ExitKind, PortState};
@@ -8,15 +9,19 @@ use crate::source::{Code, Diagnostic, Diagnostics};
 /// Reports two `go` of a mode that can hold in one tick with the same priority.
 ///
 /// Other exits have a fixed order.
-pub(crate) fn check(net: &Net<'_>, modes: &[PlannedMode], diagnostics: &mut Diagnostics) {
-    modes.iter().for_each(|mode| check_mode(net, mode, diagnostics));
+pub(crate) fn check(net: &Net<'_>, readings: &Readings, modes: &[PlannedMode], diagnostics: &mut Diagnostics) {
+    modes.iter().for_each(|mode| check_mode(net, readings, mode, diagnostics));
 }
 
-fn check_mode(net: &Net<'_>, mode: &PlannedMode, diagnostics: &mut Diagnostics) {
+fn check_mode(net: &Net<'_>, readings: &Readings, mode: &PlannedMode, diagnostics: &mut Diagnostics) {
     let exits: Vec<&PlannedExit> = mode.exits.iter().filter(|exit| exit.kind == ExitKind::Go).collect();
     for (i, second) in exits.iter().enumerate() {
+        let never_together = |first: &PlannedExit| {
+            let mut one = readings.implied(net, &first.condition);
+            one.any(|one| readings.implied(net, &second.condition).any(|other| excludes(&one, &other)))
+        };
         let is_clash = |first: &&&PlannedExit| {
-            first.to != second.to && first.priority == second.priority && !excludes(&first.condition, &second.condition)
+            first.to != second.to && first.priority == second.priority && !never_together(first)
         };
         let Some(first) = exits[..i].iter().find(is_clash) else { continue };
         let name = |exit: &PlannedExit| exit.to.map_or_else(String::new, |to| net.flat.mode_name(to));

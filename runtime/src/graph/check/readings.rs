@@ -28,6 +28,23 @@ impl Readings {
         condition.clone()
     }
 
+    /// Returns a condition, and those on the ports before it that hold in the same tick whenever it does: one on a flag is
+    /// one on its opposite, and one on the flag of a comparison is one on the number.
+    pub(super) fn implied<'a>(
+        &'a self,
+        net: &'a Net<'_>,
+        condition: &Condition,
+    ) -> impl Iterator<Item = Condition> + 'a {
+        let before = |condition: &Condition| {
+            let Condition::Port(WatchedPort { source, feature: None }, test) = condition else { return None };
+            // A node that smooths its input follows it later.
+            let exact = source.producer.node().is_some_and(|node| self.0[node] != Reading::Same);
+            let (source, test) = self.before(net, *source, *test).filter(|_| exact)?;
+            Some(Condition::Port(WatchedPort { source, feature: None }, test))
+        };
+        std::iter::successors(Some(condition.clone()), before).take(net.wires.len() + 1)
+    }
+
     /// Returns the port that the node of another one reads, and the same test of it.
     fn before(&self, net: &Net<'_>, port: PortRef, test: Test) -> Option<(PortRef, Test)> {
         let node = port.producer.node().filter(|_| port.port == 0)?;
