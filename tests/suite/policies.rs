@@ -11,6 +11,8 @@ use tactflow_tests::nodes::length_by_hand;
 use tactflow_tests::saboteur::{How, Sabotage, sabotaged};
 use tactflow_tests::{catalogue, on_the_mock_bench};
 
+use crate::tool::say;
+
 /// A trouble from 0.8 s to 1.0 s, and what a fault says of it.
 #[derive(Debug, Clone, Copy)]
 struct Case {
@@ -464,4 +466,21 @@ proptest! {
             }
         }
     }
+}
+
+#[test]
+fn a_motion_that_is_too_old_is_named_in_the_summary() {
+    // Five delays of a tick make each motion older than five ticks, so nothing moves.
+    let delay = |i: usize| {
+        let before = if i == 0 { "sum.twist".to_owned() } else { format!("late_{}.value", i - 1) };
+        [format!("--set=nodes.late_{i}.type=twist_delay"), format!("--set=nodes.late_{i}.in.value={before}")]
+    };
+    let delays: Vec<String> = (0..5).flat_map(delay).collect();
+    let delays: Vec<&str> = delays.iter().map(String::as_str).collect();
+    let run = ["run", "graphs/edge.toml", "--for=3s"];
+    let late = say(&[&run[..], &delays, &["--set=parts.move.in.twist=late_4.value"]].concat()).out;
+    let says = "`move.acceleration`: the motion was too old ";
+    let line = late.lines().find(|line| line.starts_with(says));
+    assert!(line.is_some_and(|line| line.contains(" where 20.0 ms are allowed")), "{late}");
+    assert!(!say(&run).out.contains("too old"), "the task as it is");
 }

@@ -4,7 +4,7 @@
 //! allowed motions is convex, so every point between two of its points is in it. When a limit itself moves faster than
 //! the accelerations allow, the output follows it as fast as they allow.
 
-use tactflow_runtime::node::{Describe, In, Limits, Mistakes, Node, Out, Outputs, Param, Setup, State, Tick};
+use tactflow_runtime::node::{Describe, Limits, Mistakes, Node, Out, Outputs, Param, Setup, State, Tick};
 use tactflow_runtime::signal::{Scalar, Twist};
 
 use super::{Inputs, fraction, max_age};
@@ -68,6 +68,9 @@ pub struct Outputs {
 pub struct State {
     /// The motion that was reached in the last tick [m/s, rad/s].
     reached: Twist,
+    /// Number of ticks in which the motion was too old, and its largest age in them [ns].
+    old_ticks: u64,
+    oldest: i64,
 }
 
 impl Node for AccelerationLimit {
@@ -84,9 +87,23 @@ impl Node for AccelerationLimit {
         Ok(Self { params, max_age })
     }
 
+    fn found(&self, state: &State) -> Option<String> {
+        let [oldest, most] = [state.oldest, self.max_age].map(|age| age as f64 * 1e-6);
+        (state.old_ticks > 0).then(|| {
+            format!(
+                "the motion was too old {} times, up to {oldest:.1} ms where {most:.1} ms are allowed, and was braked meanwhile",
+                state.old_ticks
+            )
+        })
+    }
+
     fn step(&self, tick: &Tick, inputs: Inputs<'_>, out: &mut Outputs, state: &mut State) {
-        let is_fresh = |twist: &In<'_, Twist>| twist.stamp().age(tick.now) <= self.max_age && !tick.is_halted;
-        let wanted = inputs.twist.filter(is_fresh);
+        let moving = inputs.twist.filter(|_| !tick.is_halted);
+        let wanted = moving.filter(|twist| twist.stamp().age(tick.now) <= self.max_age);
+        if let (Some(old), None) = (&moving, &wanted) {
+            state.old_ticks += 1;
+            state.oldest = state.oldest.max(old.stamp().age(tick.now));
+        }
         let target = wanted.map_or_else(Twist::default, |twist| countable(&twist));
         let dt = tick.dt.min(tick.max_gap);
         let (linear, angular) = (self.params.linear_m_per_s2 * dt, self.params.angular_rad_per_s2 * dt);
