@@ -69,8 +69,8 @@ fn a_loop_is_measured_with_several_settings_and_the_worst_of_them_decides() {
     let softer = "devices.bench.stiffness=100.0";
     let said = say(&["tune", &path, "--bench", &bench, "--also", softer, "--save", "--format", "json"]);
     assert_eq!(said.code, 0, "{}{}", said.out, said.err);
-    let mut printed = serde_json::Deserializer::from_str(&said.out).into_iter::<Value>();
-    let found = printed.next().unwrap().unwrap();
+    let found: Value = serde_json::from_str(&said.out).unwrap_or_else(|why| panic!("{why}: {}", said.out));
+    assert!(said.err.contains("wrote "), "{}", said.err);
     let contacts = found["contacts"].as_array().unwrap();
     let objects: Vec<&str> = contacts.iter().map(|contact| contact["object"].as_str().unwrap()).collect();
     assert_eq!(objects, ["pen".to_owned(), format!("pen with {softer}")]);
@@ -177,6 +177,31 @@ fn what_cannot_be_tuned_says_why() {
         (&["graphs/hybrid.toml", "--feature", "x", "--set", "nodes.pid.gains.x.kp=-3"], "of `x` is negative: make it"),
         (&["graphs/carry.toml", "--arm", "arm"], "no role `arm` is an arm; the arms are `left_arm`, `right_arm`"),
         (&["graphs/force.toml", "--peak", "0.9"], "it must be more than 1, as 1.7 is"),
+        (&["graphs/force.toml", "--gain-margin", "nan"], "it must be 0 or more"),
+        (
+            &["graphs/force.toml", "--set", "facts.arm.contacts=[{ object = \"cup\" }, { object = \"jar\" }]"],
+            "states contacts with `cup`, `jar`: measure it as the bench of the graph, and name the object",
+        ),
+        // A mount between the sum and the limits.
+        (
+            &[
+                "graphs/edge.toml",
+                "--set",
+                "nodes.mount.type=static_pose",
+                "--set",
+                "nodes.mount.rpy=[0, 0, 3.14159265]",
+                "--set",
+                "nodes.turned.type=adjoint",
+                "--set",
+                "nodes.turned.in.pose=mount.pose",
+                "--set",
+                "nodes.turned.in.twist=sum.twist",
+                "--set",
+                "parts.move.in.twist=turned.twist",
+            ],
+            "wire `turned_sum.twist` to what reads `turned.twist`:\n\n[nodes.turned_sum]\ntype = \"twist_adder\"\n\
+             in.mount = \"turned.twist\"",
+        ),
     ] {
         let said = say(&[&["tune"], args].concat());
         assert_eq!(said.code, 2, "{}", said.err);

@@ -14,7 +14,7 @@ use super::mount_text::{described, facing, progress, report};
 use crate::arm::mount::Mount;
 use crate::calibration::pad_mount::{MountFit, MountPosture, fit, outlier};
 use crate::motion::pose::rpy_of;
-use crate::tool::guided::{BenchFile, BoundRole, CellPort, GuidedArm, GuidedCell, Left, mount, numbers};
+use crate::tool::guided::{BoundRole, CellPort, GuidedArm, GuidedCell, Left, TomlFile, mount, numbers};
 
 /// Measure where a pad is on the arm: touch one fixed point in four postures
 #[derive(Args)]
@@ -61,7 +61,7 @@ struct Pad {
 
 pub(super) fn run(args: &MountArgs, shell: &Shell) -> Result<u8, u8> {
     let mut cell = GuidedCell::open(shell, &args.bench)?;
-    let found = Pad::find(&cell, args).and_then(|pad| Ok((pad, BenchFile::read(&args.bench)?)));
+    let found = Pad::find(&cell, args).and_then(|pad| Ok((pad, TomlFile::read(&args.bench)?)));
     let (pad, mut bench) = found.map_err(|why| shell.refuse(why))?;
     let done = pad.touch(&mut cell).and_then(|found| pad.conclude(&mut cell, &found, &mut bench));
     done.map_err(|left| left.report(shell))
@@ -143,7 +143,7 @@ impl Pad {
     }
 
     /// Prints the result, and writes it after a typed `yes`. Returns the exit code.
-    fn conclude(&self, cell: &mut GuidedCell<'_>, found: &MountFit, bench: &mut BenchFile) -> Result<u8, Left> {
+    fn conclude(&self, cell: &mut GuidedCell<'_>, found: &MountFit, bench: &mut TomlFile) -> Result<u8, Left> {
         let shell = cell.shell();
         shell.say(&format!("\n{}", report(found, &self.present.pose())));
         if found.turn_deviation.is_ok() && found.faces_away_from(&self.present.pose()) {

@@ -15,7 +15,7 @@ use crate::calibration::tool_weight::{
 };
 use crate::motion::weight::{GRAVITY, weight};
 use crate::tool::guided::vectors::three;
-use crate::tool::guided::{BenchFile, BoundRole, CellPort, GuidedArm, GuidedCell, Left, numbers};
+use crate::tool::guided::{BoundRole, CellPort, GuidedArm, GuidedCell, Left, TomlFile, numbers};
 
 /// Weigh the tool: hold the arm still in four postures
 #[derive(Args)]
@@ -60,7 +60,7 @@ struct Sensor {
 
 pub(super) fn run(args: &ToolArgs, shell: &Shell) -> Result<u8, u8> {
     let mut cell = GuidedCell::open(shell, &args.bench)?;
-    let found = Sensor::find(&cell, args).and_then(|sensor| Ok((sensor, BenchFile::read(&args.bench)?)));
+    let found = Sensor::find(&cell, args).and_then(|sensor| Ok((sensor, TomlFile::read(&args.bench)?)));
     let (sensor, mut bench) = found.map_err(|why| shell.refuse(why))?;
     let done = sensor.weigh(&mut cell).and_then(|found| conclude(&mut cell, &sensor, &found, &mut bench));
     done.map_err(|left| left.report(shell))
@@ -174,7 +174,7 @@ fn lines_of(found: &WeightFit) -> String {
 }
 
 /// Prints the result, and writes it after a typed `yes`. Returns the exit code.
-fn conclude(cell: &mut GuidedCell<'_>, sensor: &Sensor, found: &WeightFit, bench: &mut BenchFile) -> Result<u8, Left> {
+fn conclude(cell: &mut GuidedCell<'_>, sensor: &Sensor, found: &WeightFit, bench: &mut TomlFile) -> Result<u8, Left> {
     let shell = cell.shell();
     let [fx, fy, fz, tx, ty, tz] = found.offset;
     shell.say(&format!(
@@ -213,7 +213,7 @@ fn conclude(cell: &mut GuidedCell<'_>, sensor: &Sensor, found: &WeightFit, bench
     }
 }
 
-fn write(cell: &mut GuidedCell<'_>, bound: &BoundRole, found: &WeightFit, bench: &mut BenchFile) -> Result<u8, Left> {
+fn write(cell: &mut GuidedCell<'_>, bound: &BoundRole, found: &WeightFit, bench: &mut TomlFile) -> Result<u8, Left> {
     let section = ["devices", bound.device.as_str()];
     let mass = (found.mass * 1e4).round() / 1e4;
     let set = bench

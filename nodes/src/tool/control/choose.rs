@@ -52,18 +52,18 @@ pub(crate) fn bound(loops: &[Loop], wanted: Wanted) -> Option<(usize, String)> {
 
 /// Ratio of two neighbouring gains that are tried, before the last ones are halved.
 const STEP: f64 = 1.1;
-/// Gain around a loop in one period above which nothing is tried [1].
+/// Gain of a controller around its loop in one period above which nothing is tried [1].
 const MAX_SHARE: f64 = 0.5;
 
 /// Returns the largest factor on all gains of a feature up to which each of its loops keeps the margins; `None` if there
 /// is none. With an integral, the margins do not hold for very small gains.
 pub(crate) fn factor(loops: &[Loop], wanted: Wanted) -> Option<f64> {
-    let share = |around: &Loop, factor: f64| around.proportional().abs() * around.period * factor;
-    let is_tried = |factor: f64| loops.iter().all(|around| share(around, factor) < MAX_SHARE);
+    let share = |around: &Loop| around.own_proportional().abs() * around.period;
+    let is_tried = |factor: f64| loops.iter().all(|around| share(around) * factor < MAX_SHARE);
     let holds =
         |factor: f64| is_tried(factor) && loops.iter().all(|around| wanted.holds(&margins(&around.times(factor))));
     // From a crossover that is far below the rate of the graph.
-    let mut low = loops.iter().map(|around| 1e-4 / share(around, 1.0)).reduce(f64::min)?;
+    let mut low = loops.iter().map(|around| 1e-4 / share(around)).reduce(f64::min)?;
     while !holds(low) {
         low *= STEP;
         if !is_tried(low) {

@@ -76,9 +76,20 @@ impl Answer {
         self.resonance_hz.is_some() || self.latency_ms.is_some() || !self.response.is_empty()
     }
 
+    /// Returns the change of the feature along each component of a twist, as far as it is stated.
+    pub(crate) const fn entries(&self) -> [Option<f64>; 6] {
+        [self.vx, self.vy, self.vz, self.wx, self.wy, self.wz]
+    }
+
+    /// States the change of the feature along one component.
+    pub(crate) fn set_entry(&mut self, component: usize, change: f64) {
+        let Self { vx, vy, vz, wx, wy, wz, .. } = self;
+        *[vx, vy, vz, wx, wy, wz][component] = Some(change);
+    }
+
     /// Returns the change of the feature for each unit of a twist.
     pub(crate) fn row(&self) -> [f64; 6] {
-        [self.vx, self.vy, self.vz, self.wx, self.wy, self.wz].map(Option::unwrap_or_default)
+        self.entries().map(Option::unwrap_or_default)
     }
 
     /// Returns the change of the feature for one unit of a column.
@@ -93,8 +104,13 @@ impl Answer {
     }
 
     /// Returns by how much the feature answers late at most: by its latency, or at a frequency of its response [ms].
+    ///
+    /// Frequencies below 1 Hz count if there are no others: an error of 1 deg in their phase is one of more than 2.7 ms.
     pub(crate) fn lag_ms(&self) -> Option<f64> {
-        let late = self.response.iter().map(|[hz, _, phase]| -phase / (360.0 * hz) * 1e3);
+        let is_fast = |[hz, ..]: &[f64; 3]| *hz >= 1.0;
+        let has_fast = self.response.iter().any(is_fast);
+        let counted = self.response.iter().filter(|point| is_fast(point) || !has_fast);
+        let late = counted.map(|[hz, _, phase]| -phase / (360.0 * hz) * 1e3);
         self.latency_ms.into_iter().chain(late).reduce(f64::max).map(|lag| (10.0 * lag).round() / 10.0)
     }
 
@@ -223,6 +239,17 @@ mod tests {
         assert_eq!(ball.answer("y").unwrap().row(), [0.0, -1.0, 0.0, 0.0, 0.0, 0.0]);
         assert_eq!(ball.answer("force"), None);
         assert_eq!(contacts(&[], "arm"), Ok(Vec::new()));
+    }
+
+    #[test]
+    fn the_lag_of_a_response_is_that_of_its_fast_frequencies() {
+        let lag = |response: &[[f64; 3]], latency_ms: Option<f64>| {
+            Answer { response: response.to_vec(), latency_ms, ..Answer::default() }.lag_ms()
+        };
+        assert_eq!(lag(&[[0.5, 1.0, -9.0], [1.0, 1.0, -9.0], [5.0, 1.0, -36.0]], None), Some(25.0));
+        assert_eq!(lag(&[[0.5, 1.0, -9.0]], Some(30.0)), Some(50.0), "nothing else is known");
+        assert_eq!(lag(&[[5.0, 1.0, -36.0]], Some(30.0)), Some(30.0));
+        assert_eq!(lag(&[], None), None);
     }
 
     #[test]

@@ -108,7 +108,12 @@ impl Loop {
 
     /// Returns the proportional gain around the loop [rad/s].
     pub(crate) fn proportional(&self) -> f64 {
-        self.all().map(|one| one.kp * one.gain).sum()
+        self.all().map(Self::own_proportional).sum()
+    }
+
+    /// Returns the proportional gain around the loop by its own controller, without those beside it [rad/s].
+    pub(crate) fn own_proportional(&self) -> f64 {
+        self.kp * self.gain
     }
 
     /// Returns the loop and those beside it.

@@ -2,9 +2,9 @@
 //! terminal.
 
 mod arm;
-mod bench_file;
 pub(super) mod mount;
 mod tables;
+mod toml_file;
 pub(super) mod vectors;
 
 use std::io::BufRead;
@@ -21,8 +21,8 @@ use tactflow_runtime::signal::Signal;
 use tactflow_runtime::source::quoted;
 
 pub(super) use arm::{GuidedArm, StillPosture, chain};
-pub(super) use bench_file::{BenchFile, joint_numbers, numbers};
 pub(super) use tables::headed;
+pub(super) use toml_file::{TomlFile, joint_numbers, numbers};
 
 /// Longest time between two looks at the devices, which wake the thread when they sample.
 const LOOK: Duration = Duration::from_millis(1);
@@ -198,7 +198,7 @@ impl<'s> GuidedCell<'s> {
     ///
     /// # Errors
     /// If the dialogue ends first.
-    pub(super) fn write_after_yes(&mut self, bench: &BenchFile) -> Result<u8, Left> {
+    pub(super) fn write_after_yes(&mut self, bench: &TomlFile) -> Result<u8, Left> {
         if bench.is_unchanged() {
             self.shell.say("nothing was measured, so nothing is written");
             return Ok(0);

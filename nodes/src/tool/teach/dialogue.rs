@@ -4,7 +4,7 @@ use nalgebra::Vector3;
 use toml_edit::{Array, Value};
 
 use super::super::guided::vectors::three;
-use super::super::guided::{BenchFile, GuidedCell, Left, StillPosture, joint_numbers, numbers};
+use super::super::guided::{GuidedCell, Left, StillPosture, TomlFile, joint_numbers, numbers};
 use super::Step;
 use super::plane::{FreeSide, fit};
 use super::site::Site;
@@ -45,7 +45,7 @@ impl Taught {
     ///
     /// # Errors
     /// If a section of the file cannot be changed.
-    pub(super) fn write_into(&self, mut file: BenchFile, site: &Site) -> Result<BenchFile, String> {
+    pub(super) fn write_into(&self, mut file: TomlFile, site: &Site) -> Result<TomlFile, String> {
         let device = ["devices", site.arm.bound.device.as_str()];
         for (key, joints) in [("home", &self.home), ("start", &self.start)] {
             joints

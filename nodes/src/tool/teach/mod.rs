@@ -11,7 +11,7 @@ use std::path::PathBuf;
 use tactflow_runtime::cli::Shell;
 use tactflow_runtime::cli::clap::{self, Parser, ValueEnum};
 
-use super::guided::{BenchFile, GuidedCell, Left};
+use super::guided::{GuidedCell, Left, TomlFile};
 use dialogue::Dialogue;
 use site::Site;
 
@@ -88,7 +88,7 @@ fn not_negative(text: &str) -> Result<f64, String> {
 
 pub(super) fn run(args: TeachArgs, shell: &Shell) -> Result<u8, u8> {
     let refuse = |why: String| shell.refuse(why);
-    let file = BenchFile::read(&args.bench).map_err(refuse)?;
+    let file = TomlFile::read(&args.bench).map_err(refuse)?;
     let mut cell = GuidedCell::open(shell, &args.bench)?;
     let site = Site::find(&cell, &file, args.arm.as_deref(), args.sensor.as_deref()).map_err(refuse)?;
     let steps = [Step::Home, Step::Start, Step::Workspace, Step::KeepOut];

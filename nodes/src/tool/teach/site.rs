@@ -9,7 +9,7 @@ use tactflow_runtime::signal::{Joints, Shape};
 use tactflow_runtime::source::quoted;
 use toml::Value;
 
-use super::super::guided::{BenchFile, BoundRole, GuidedArm, GuidedCell, mount};
+use super::super::guided::{BoundRole, GuidedArm, GuidedCell, TomlFile, mount};
 use crate::motion::pose::pose_of;
 
 /// An arm of a bench, and the point on it that touches.
@@ -44,7 +44,7 @@ impl Site {
     /// If the bench has no such arm or pad, or several and none is named, or if the arm cannot be taught.
     pub(super) fn find(
         cell: &GuidedCell<'_>,
-        file: &BenchFile,
+        file: &TomlFile,
         arm: Option<&str>,
         sensor: Option<&str>,
     ) -> Result<Self, String> {

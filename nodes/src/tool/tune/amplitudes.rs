@@ -128,7 +128,10 @@ fn runs(experiment: &Experiment<'_>, component: usize, shell: &Shell) -> Result<
             }
             Answered::Nothing { why, is_absent } => {
                 found.is_absent = is_absent;
-                (format!("with a test signal of {amplitude} {unit}, {why}"), Unknown::Lost)
+                // Gains that hold two smaller motions are not those that lose the place or the angle.
+                let is_far = is_absent && component != PRESSES && found.runs.len() >= 2;
+                let kind = if is_far { Unknown::Hidden } else { Unknown::Lost };
+                (format!("with a test signal of {amplitude} {unit}, {why}"), kind)
             }
             Answered::NotReached(why) if found.runs.is_empty() => (why, Unknown::NotReached),
             Answered::NotReached(why) => (why, Unknown::Lost),

@@ -1,9 +1,11 @@
 //! What is measured: the graph on each bench, and with each setting.
 
+use std::collections::BTreeSet;
 use std::path::PathBuf;
 
 use tactflow_runtime::cli::Shell;
 use tactflow_runtime::graph::{Outline, Request, compile};
+use tactflow_runtime::source::quoted;
 
 use super::task::Task;
 use super::{TuneArgs, signal};
@@ -50,15 +52,45 @@ pub(super) fn cases(
         let outline = &task.outline(compiled.outline());
         request.set.extend(signal::long_enough(outline, signal::duration(outline.period_s)));
         let stated = Stated { file: bench_file(outline), contacts: contacts(compiled.facts(), arm)? };
-        let stem = stated.file.as_ref().and_then(|file| file.file_stem());
         // Those with a setting are of the same object.
-        let first = stated.contacts.first().map(|contact| contact.object.clone());
-        let object = first.or_else(|| stem.map(|stem| stem.to_string_lossy().into_owned()));
-        let with = also.map_or_else(String::new, |set| format!(" with {set}"));
-        let outline = outline.clone();
-        Ok(Case { request, outline, stated, object: object.unwrap_or_else(|| "object".into()) + &with })
+        let with = also.map_or_else(String::new, |set| format!("{WITH}{set}"));
+        let object = touched(&stated, args.object.as_deref().filter(|_| bench.is_none()))? + &with;
+        Ok(Case { request, outline: outline.clone(), stated, object })
     })
     .collect()
+}
+
+/// What stands between an object and a setting in the name of a contact.
+const WITH: &str = " with ";
+
+/// Returns the object that the arm touches on a bench: the one with this name, or else the only one that the bench states.
+fn touched(bench: &Stated, name: Option<&str>) -> Result<String, String> {
+    let Stated { file, contacts } = bench;
+    if let Some(name) = name {
+        return Ok(name.to_owned());
+    }
+    let objects: BTreeSet<&str> = contacts.iter().map(object).collect();
+    match (objects.len(), &contacts[..], file) {
+        (_, [], None) => Ok("object".into()),
+        (_, [], Some(file)) => Ok(file.file_stem().unwrap_or_default().to_string_lossy().into_owned()),
+        (_, [only], _) => Ok(only.object.clone()),
+        (1, [one, ..], _) => Ok(object(one).to_owned()),
+        (_, [.., last], _) => {
+            let file = file.as_ref().map_or_else(String::new, |file| file.display().to_string());
+            Err(format!(
+                "the bench `{file}` states contacts with {}: measure it as the bench of the graph, and name the object that the \
+                 arm touches, for example with `--bench {file} --object {:?}`",
+                quoted(objects),
+                last.object
+            ))
+        }
+    }
+}
+
+/// Returns the object of a contact. That with a setting is no other object.
+fn object(contact: &Contact) -> &str {
+    let setting = contact.object.split_once(WITH).filter(|(_, setting)| setting.contains('='));
+    setting.map_or(&*contact.object, |(object, _)| object)
 }
 
 /// Refuses a bench that does not answer the motion of the arm.
@@ -75,4 +107,37 @@ pub(super) fn answers(outline: &Outline) -> Result<(), String> {
 /// Returns the file of the bench that a request uses, as the places of its devices say.
 fn bench_file(outline: &Outline) -> Option<PathBuf> {
     outline.devices.first().map(|device| PathBuf::from(&device.place.file))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn of_several_objects_that_a_bench_states_one_must_be_named() {
+        let bench = |objects: &[&str]| Stated {
+            file: Some("hand.toml".into()),
+            contacts: objects.iter().map(|object| Contact::unmeasured((*object).to_owned())).collect(),
+        };
+        for (objects, name, expected) in [
+            (&[][..], None, Some("hand")),
+            (&["ball"], None, Some("ball")),
+            (&["ball with a=1", "ball"], None, Some("ball")),
+            (&["ball"], Some("pen"), Some("pen")),
+            (&["ball", "pen"], Some("pen"), Some("pen")),
+            (&["ball", "pen"], Some("cup"), Some("cup")),
+            (&["ball", "pen"], None, None),
+            (&["cup with milk", "cup with tea"], None, None),
+        ] {
+            let found = touched(&bench(objects), name);
+            assert_eq!(found.as_deref().ok(), expected, "{objects:?} {name:?}");
+            if let Err(why) = found {
+                let example = format!("`--bench hand.toml --object {:?}`", objects[1]);
+                assert!(
+                    objects.iter().all(|object| why.contains(&format!("`{object}`"))) && why.ends_with(&example),
+                    "{why}"
+                );
+            }
+        }
+    }
 }

@@ -2,6 +2,7 @@
 
 use toml_edit::{Array, ArrayOfTables, Item, Table, Value};
 
+use crate::motion::COMPONENTS;
 use crate::tool::control::contacts::{Answer, Contact};
 use crate::tool::guided::headed;
 
@@ -31,21 +32,12 @@ fn table(contact: &Contact) -> Table {
 }
 
 fn of_feature(answer: &Answer) -> Table {
-    let Answer { vx, vy, vz, wx, wy, wz, resonance_hz, damping_ratio, latency_ms, play, ref response } = *answer;
-    let keys = [
-        ("vx", vx),
-        ("vy", vy),
-        ("vz", vz),
-        ("wx", wx),
-        ("wy", wy),
-        ("wz", wz),
-        ("resonance_hz", resonance_hz),
-        ("damping_ratio", damping_ratio),
-        ("latency_ms", latency_ms),
-        ("play", play),
-    ];
+    let Answer { resonance_hz, damping_ratio, latency_ms, play, ref response, .. } = *answer;
+    let others =
+        [("resonance_hz", resonance_hz), ("damping_ratio", damping_ratio), ("latency_ms", latency_ms), ("play", play)];
     let mut table = Table::new();
-    for (key, value) in keys.into_iter().filter_map(|(key, value)| Some((key, value?))) {
+    let all = COMPONENTS.into_iter().zip(answer.entries()).chain(others);
+    for (key, value) in all.filter_map(|(key, value)| Some((key, value?))) {
         table.insert(key, value.into());
     }
     if !response.is_empty() {

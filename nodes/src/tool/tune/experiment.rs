@@ -175,6 +175,9 @@ impl Experiment<'_> {
         if column.iter().filter(|entry| **entry != 0.0).count() > 1 {
             let mut alone = [0.0; 6];
             alone[component] = column[component];
+            // A mount turns what is written.
+            let written = self.feature.turn.as_ref().and_then(|turn| turn.written(alone));
+            let alone = written.unwrap_or(alone);
             set.push(format!("nodes.{}.columns.{}={alone:?}", self.feature.jacobian, self.feature.name));
         }
         set

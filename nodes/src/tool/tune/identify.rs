@@ -1,6 +1,6 @@
 //! How a feature answers the motion over one contact.
 
-use serde::Serialize;
+use serde::{Serialize, Serializer};
 use tactflow_runtime::cli::Shell;
 
 use super::Stop;
@@ -18,8 +18,9 @@ use crate::tool::control::law::Feature;
 #[derive(Debug, Serialize)]
 pub(super) struct Identified {
     pub(super) object: String,
-    /// For each component that moves the feature: its name, and the fit.
-    pub(super) fits: Vec<(&'static str, Fit)>,
+    /// For each component that moves the feature: its number, and the fit.
+    #[serde(serialize_with = "by_name")]
+    pub(super) fits: Vec<(usize, Fit)>,
     /// What was measured, for each component.
     #[serde(skip)]
     pub(super) lines: Vec<Vec<Line>>,
@@ -67,13 +68,18 @@ pub(super) fn identify(experiment: &Experiment<'_>, object: &str, shell: &Shell)
     for component in (0..6).filter(|i| feature.column[*i] != 0.0) {
         let (response, play) = agreed(experiment, component, shell)?;
         found.play = found.play.or_else(|| play.map(|play| to_two_digits(play, libm::round)));
-        let unknown = response.as_ref().err().map_or(Unknown::Hidden, |refusal| refusal.kind);
+        let unknown = match response.as_ref().err().map(|refusal| refusal.kind) {
+            // With the same gains, a motion along another component has been answered.
+            Some(Unknown::Lost) if found.fits.is_empty() => Unknown::Lost,
+            Some(Unknown::NotReached) => Unknown::NotReached,
+            _ => Unknown::Hidden,
+        };
         let fitted = response
             .map_err(|refusal| refusal.why)
             .and_then(|response| Ok((fitted(feature, component, &response)?, response)));
         match fitted {
             Ok((fit, Response { lines, growth, limited, lifts_off })) => {
-                found.fits.push((COMPONENTS[component], fit));
+                found.fits.push((component, fit));
                 found.lines.push(lines);
                 found.growth = growth.or(found.growth);
                 found.limited = limited.or(found.limited);
@@ -98,7 +104,7 @@ fn fitted(feature: &Feature, component: usize, response: &Response) -> Result<Fi
         let all = response.lines.len();
         format!("only {few} of {all} frequencies stand out of the noise, and a fit needs {ENOUGH}")
     })?;
-    let slides = response.growth.is_some() && Answer::of_geometry(&quantity).is_some();
+    let slides = response.growth.is_some() && Answer::of_geometry(quantity).is_some();
     let (most, also) = match slides {
         true => (MAX_RESIDUAL_SLIDING, ", and no two test signals agree"),
         false => (MAX_RESIDUAL, ""),
@@ -109,7 +115,7 @@ fn fitted(feature: &Feature, component: usize, response: &Response) -> Result<Fi
             "a gain, a resonance and a latency leave {percent:.0} % of the response unexplained{also}"
         ));
     }
-    if sticks(&quantity, component, &fit) {
+    if sticks(quantity, component, &fit) {
         return Err(format!("friction holds the contact: it follows {:.0} % of the motion", 100.0 * fit.gain.abs()));
     }
     Ok(fit)
@@ -127,27 +133,20 @@ fn sticks(quantity: &str, component: usize, fit: &Fit) -> bool {
 /// A contact that sticks follows a small motion only in part. It can slide at any time, so what geometry says counts if
 /// it is more, or if the response is not known.
 pub(super) fn answer(feature: &Feature, found: &Identified) -> Answer {
-    let geometry = Answer::of_geometry(&quantity(feature)).unwrap_or_default().row();
+    let geometry = Answer::of_geometry(quantity(feature)).unwrap_or_default().row();
     if found.refused.is_some() {
-        return Answer { play: found.play, ..Answer::of_geometry(&quantity(feature)).unwrap_or_default() };
+        return Answer { play: found.play, ..Answer::of_geometry(quantity(feature)).unwrap_or_default() };
     }
     let mut answer = Answer::default();
     for (component, fit) in &found.fits {
-        let entry = match *component {
-            "vx" => &mut answer.vx,
-            "vy" => &mut answer.vy,
-            "vz" => &mut answer.vz,
-            "wx" => &mut answer.wx,
-            "wy" => &mut answer.wy,
-            _ => &mut answer.wz,
-        };
-        let slides = geometry[index(component)];
-        *entry = Some(if slides.abs() > fit.gain.abs() { slides } else { to_three_digits(fit.gain) });
+        let slides = geometry[*component];
+        let change = if slides.abs() > fit.gain.abs() { slides } else { to_three_digits(fit.gain) };
+        answer.set_entry(*component, change);
     }
     answer.play = found.play;
     let Some((_, main)) = found.fits.first() else { return answer };
     if let ([(component, fit)], [lines]) = (&found.fits[..], &found.lines[..]) {
-        answer.response = fit.response(lines, known(feature, index(component)));
+        answer.response = fit.response(lines, known(feature, *component));
     }
     answer.resonance_hz = main.resonance.map(|(hz, _)| to_three_digits(hz));
     answer.damping_ratio = main.resonance.map(|(_, damping)| to_three_digits(damping));
@@ -155,12 +154,12 @@ pub(super) fn answer(feature: &Feature, found: &Identified) -> Answer {
     answer
 }
 
-/// Returns the number of a component with this name.
-fn index(component: &str) -> usize {
-    COMPONENTS.iter().position(|name| *name == component).unwrap_or_default()
+/// Returns the name of what a feature measures; "" for one without, which is not tuned.
+pub(super) fn quantity(feature: &Feature) -> &str {
+    feature.quantity().unwrap_or_default()
 }
 
-/// Returns the name of what a feature measures.
-pub(super) fn quantity(feature: &Feature) -> String {
-    feature.quantity().unwrap_or(&feature.name).to_owned()
+/// Writes the fits with the names of their components.
+fn by_name<S: Serializer>(fits: &[(usize, Fit)], serializer: S) -> Result<S::Ok, S::Error> {
+    serializer.collect_seq(fits.iter().map(|(component, fit)| (COMPONENTS[*component], fit)))
 }

@@ -80,6 +80,9 @@ pub(super) struct TuneArgs {
     /// Measure on this bench too, for an object of another stiffness; may be repeated
     #[arg(long = "with", value_name = "FILE")]
     others: Vec<PathBuf>,
+    /// Name of the object that the arm touches; needed where the bench states several contacts
+    #[arg(long, value_name = "NAME")]
+    object: Option<String>,
     /// Measure with this setting too, on each bench, for example with another setpoint; may be repeated
     #[arg(long = "also", value_name = "KEY=VALUE")]
     also: Vec<String>,
@@ -96,10 +99,10 @@ pub(super) struct TuneArgs {
     #[arg(long, value_name = "FACTOR", default_value_t = Wanted::default().peak, value_parser = peak)]
     peak: f64,
     /// Smallest gain margin [dB]
-    #[arg(long, value_name = "DB", default_value_t = Wanted::default().gain_db)]
+    #[arg(long, value_name = "DB", default_value_t = Wanted::default().gain_db, value_parser = margin)]
     gain_margin: f64,
     /// Smallest phase margin [deg]
-    #[arg(long, value_name = "DEG", default_value_t = Wanted::default().phase_deg)]
+    #[arg(long, value_name = "DEG", default_value_t = Wanted::default().phase_deg, value_parser = margin)]
     phase_margin: f64,
     /// Write the gains into the graph or the file of its part, and the contacts into the benches; comments stay
     #[arg(long)]
@@ -155,7 +158,10 @@ pub(super) fn run(args: TuneArgs, shell: &Shell) -> Result<u8, u8> {
     }
     if args.save && is_whole {
         let written = save::save(&args, &outline, &tuned, shell).map_err(|message| shell.refuse(message))?;
-        shell.say(&written);
+        match args.format {
+            Format::Json => shell.say_beside(&written),
+            Format::Text => shell.say(&written),
+        }
     } else if args.save {
         shell.warning("nothing is written: not all features have gains that hold");
     }
@@ -172,11 +178,19 @@ fn peak(text: &str) -> Result<f64, String> {
     (peak > 1.0).then_some(peak).ok_or_else(|| "it must be more than 1, as 1.7 is".to_owned())
 }
 
-/// Checks before the long measurement that a picture can be written.
+/// Reads a margin.
+fn margin(text: &str) -> Result<f64, String> {
+    let margin: f64 = text.parse().map_err(|error| format!("{error}"))?;
+    (margin >= 0.0 && margin.is_finite()).then_some(margin).ok_or_else(|| "it must be 0 or more".to_owned())
+}
+
+/// Checks before the long measurement that a picture can be written. It leaves no new file behind.
 fn writable(path: &Path) -> Result<(), String> {
     may_draw(path)?;
-    let opened = std::fs::OpenOptions::new().append(true).create(true).open(path);
-    opened.map(drop).map_err(|error| format!("cannot write `{}`: {error}", path.display()))
+    let is_new = path.symlink_metadata().is_err();
+    let opened = std::fs::OpenOptions::new().append(true).create(true).open(path).map(drop);
+    let checked = opened.and_then(|()| if is_new { std::fs::remove_file(path) } else { Ok(()) });
+    checked.map_err(|error| format!("cannot write `{}`: {error}", path.display()))
 }
 
 /// Measures the features of one mode, proposes gains, and tries them.
@@ -192,7 +206,8 @@ fn tune(args: &TuneArgs, shell: &Shell, request: &Request, compiled: Compiled) -
     let outline = &task.outline(&whole);
     let command = target::command(outline, Some(command.arm))?;
     let index = Index::new(outline);
-    let Chain { limits, twist, .. } = chain(&Nodes::new(&index, None), command.port)?;
+    let Chain { limits, twist, mounts } = chain(&Nodes::new(&index, None), command.port)?;
+    target::is_unturned(&mounts, &twist)?;
     let (mode, controlled) = controlled(args, &index, &twist)?;
     if args.save {
         save::is_possible(&whole, &task, mode, &controlled)?;

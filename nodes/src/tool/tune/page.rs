@@ -16,6 +16,7 @@ use super::propose::{Bound, TunedFeature};
 use super::settled::Held;
 use super::step::{self, Step};
 use super::tuned::Tuned;
+use crate::motion::COMPONENTS;
 use crate::tool::control::digits::{or_none, to_three_digits};
 use crate::tool::control::law::Feature;
 
@@ -50,7 +51,7 @@ fn answers(feature: &Feature, found: &[Identified]) -> String {
             let (hz, damping) = fit.resonance.unzip();
             [
                 one.object.clone(),
-                (*component).to_owned(),
+                COMPONENTS[*component].to_owned(),
                 to_three_digits(fit.gain).to_string(),
                 or_none(hz, "Hz", 1),
                 damping.map_or_else(String::new, |damping| format!("{damping:.2}")),
@@ -137,7 +138,14 @@ fn climbed(feature: &TunedFeature) -> String {
 /// Why no gains are proposed.
 fn why_none(feature: &TunedFeature) -> String {
     if feature.is_measured() && !feature.is_light() {
-        return "No gain keeps the margins: the motion increases the error.\n".into();
+        let is_reversed = feature.loops.iter().any(|(_, around)| around.is_reversed());
+        let [kp, ki, kd] = feature.old;
+        let why = match (is_reversed, [ki, kd]) {
+            (true, _) => "the motion increases the error".to_owned(),
+            (_, [0.0, 0.0]) => "they are larger than a small gain leaves; ask for smaller ones".to_owned(),
+            _ => format!("with ki = {ki} and kd = {kd} beside kp = {kp} the loop swings; begin with ki = 0 and kd = 0"),
+        };
+        return format!("No gain keeps the margins: {why}.\n");
     }
     if feature.is(Unknown::NotReached) {
         return "No gains are proposed: the task must reach the mode with half of these gains; `tactflow run` shows what it \

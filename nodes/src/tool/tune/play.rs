@@ -29,7 +29,7 @@ const STEPS: usize = 50;
 /// Returns the play of a place [m] or an angle [rad]: the median of the sines that count, or else the largest one of those
 /// that hardly slide the contact. `None` if too few sines count, or if the feature is of another kind.
 pub(super) fn play<'a>(feature: &Feature, component: usize, lines: impl Iterator<Item = &'a Line>) -> Option<f64> {
-    let whole = Answer::of_geometry(feature.quantity().unwrap_or(&feature.name))?.row()[component].abs();
+    let whole = Answer::of_geometry(feature.quantity()?)?.row()[component].abs();
     let known = known(feature, component);
     let slow = lines.filter(|line| line.counts() && line.omega <= 2.0 * PI * SLOW_HZ);
     let left: Vec<(f64, f64)> =

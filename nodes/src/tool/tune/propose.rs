@@ -265,7 +265,7 @@ impl Measurement<'_> {
                 Experiment { catalogue, task, request, outline, mode, adder, feature, pace, period, share };
             let found = identify(&experiment, &case.object, self.shell)?;
             if found.refused.is_none() || found.play.is_some() {
-                contact.features.insert(quantity(feature), answer(feature, &found));
+                contact.features.insert(quantity(feature).to_owned(), answer(feature, &found));
             }
             Ok(found)
         });

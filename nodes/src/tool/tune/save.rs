@@ -12,7 +12,7 @@ use super::task::Task;
 use super::tuned::Tuned;
 use super::{TuneArgs, gain_keys};
 use crate::tool::control::law::Feature;
-use crate::tool::guided::BenchFile;
+use crate::tool::guided::TomlFile;
 
 /// Writes all files, and returns what was written. The outline is that of the task.
 ///
@@ -20,7 +20,7 @@ use crate::tool::guided::BenchFile;
 /// If a file cannot be changed; then nothing is written.
 pub(super) fn save(args: &TuneArgs, outline: &Outline, tuned: &Tuned, shell: &Shell) -> Result<String, String> {
     let task = tuned.task.file().unwrap_or(&args.graph);
-    let mut graph = BenchFile::read(task)?;
+    let mut graph = TomlFile::read(task)?;
     for (key, [_, gain]) in tuned.gains(outline).filter(|(_, [old, new])| old != new) {
         let path: Vec<&str> = key.split('.').collect();
         let Some((last, section)) = path.split_last() else { continue };
@@ -37,7 +37,7 @@ pub(super) fn save(args: &TuneArgs, outline: &Outline, tuned: &Tuned, shell: &Sh
         // A graph can have its own devices.
         let is_graph = bench == *task;
         if !is_graph {
-            files.push(BenchFile::read(&bench)?);
+            files.push(TomlFile::read(&bench)?);
         }
         let Some(file) = (if is_graph { files.first_mut() } else { files.last_mut() }) else { continue };
         file.set_tables(&["facts", &tuned.arm], CONTACTS, tables(&contacts))?;
@@ -45,7 +45,7 @@ pub(super) fn save(args: &TuneArgs, outline: &Outline, tuned: &Tuned, shell: &Sh
             file.check(shell.catalogue())?;
         }
     }
-    files.iter().try_for_each(BenchFile::write)?;
+    files.iter().try_for_each(TomlFile::write)?;
     let written = files.iter().map(|file| format!("wrote {}:\n{}\n", file.path().display(), file.changes()));
     Ok(written.collect::<String>().trim_end().to_owned())
 }

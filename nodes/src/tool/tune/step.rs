@@ -132,9 +132,7 @@ pub(super) fn plan(outline: &Outline, mode: &OutlinedMode, features: &[&Feature]
 
 /// Returns how far the values of a place reach over the pad [m], if its node states their range.
 fn extent(nodes: &Nodes<'_>, feature: &Feature) -> Option<f64> {
-    let port = feature.measured.as_ref()?;
-    let [least, most] = nodes.writer(port)?.outputs.iter().find(|output| output.name == *port)?.range?;
-    Some(most - least)
+    feature.range(nodes).map(|[least, most]| most - least)
 }
 
 /// Returns the size of a step of a feature with its unit, where the unit is known.

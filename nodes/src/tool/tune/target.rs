@@ -6,6 +6,7 @@ use super::TuneArgs;
 use super::task::Task;
 use crate::tool::control::collect::law;
 use crate::tool::control::law::Feature;
+use crate::tool::control::mount::Mount;
 use crate::tool::control::nodes::{Command, Index, Nodes, commands};
 use crate::tool::control::schedule::Schedule;
 
@@ -48,6 +49,7 @@ pub(super) fn controlled<'o>(
     if features.is_empty() {
         return Err(format!("the mode `{}` controls no feature with a `pid`", mode.name));
     }
+    features.iter().try_for_each(is_measured)?;
     features.iter().try_for_each(has_a_known_schedule)?;
     Ok((*mode, features))
 }
@@ -92,6 +94,17 @@ pub(super) fn task(index: &Index<'_>, twist: &str, arm: &str) -> Result<Task, St
     ))
 }
 
+/// Refuses a feature of which nothing says what it measures.
+fn is_measured(feature: &Feature) -> Result<(), String> {
+    feature.quantity().map(drop).ok_or_else(|| {
+        format!(
+            "the error of `{}` comes from no `feature_error`, so that nothing says what it measures: tune the others, with \
+             `--feature`",
+            feature.name
+        )
+    })
+}
+
 /// Refuses a feature whose gains are multiplied by what nothing says.
 fn has_a_known_schedule(feature: &Feature) -> Result<(), String> {
     let unknown = feature.schedules.iter().find(|schedule| schedule.nominal.is_none());
@@ -102,6 +115,17 @@ fn has_a_known_schedule(feature: &Feature) -> Result<(), String> {
             feature.name
         ))
     })
+}
+
+/// Refuses a twist that a mount turns on its way to the arm: a test signal along one axis would move the sensor along another.
+pub(super) fn is_unturned(mounts: &[Mount], twist: &str) -> Result<(), String> {
+    let Some(Mount { node, .. }) = mounts.first() else { return Ok(()) };
+    let sum = format!("{node}_sum");
+    Err(format!(
+        "`{node}` turns the motion `{twist}` on its way to the arm: add a `twist_adder` behind it, so that the test signal \
+         moves the sensor along its own axes, and wire `{sum}.twist` to what reads `{node}.twist`:\n\n[nodes.{sum}]\ntype = \
+         \"twist_adder\"\nin.mount = \"{node}.twist\""
+    ))
 }
 
 /// Returns the node that adds the test signal to the motion.

@@ -1,4 +1,4 @@
-//! A bench file that is changed in place. Its comments and its order stay.
+//! A TOML file, such as a bench or a graph, that is changed in place. Its comments and its order stay.
 
 use std::fs;
 use std::io::{self, Write};
@@ -12,9 +12,9 @@ use toml_edit::{Array, ArrayOfTables, DocumentMut, Item, Table, TableLike, Value
 
 use super::tables::{comments, headed, update};
 
-/// The text of a bench, and what is to be changed in it.
+/// The text of a file, and what is to be changed in it.
 #[derive(Debug, Clone)]
-pub(crate) struct BenchFile {
+pub(crate) struct TomlFile {
     path: PathBuf,
     /// The text as it was read.
     before: String,
@@ -23,8 +23,8 @@ pub(crate) struct BenchFile {
     changes: Vec<(String, String)>,
 }
 
-impl BenchFile {
-    /// Reads a bench file.
+impl TomlFile {
+    /// Reads a file.
     ///
     /// # Errors
     /// If it cannot be read, or is no TOML.
@@ -293,7 +293,7 @@ linear_m_per_s = 0.05
     #[test]
     fn comments_and_order_stay() {
         let path = file("order");
-        let mut bench = BenchFile::read(&path).expect("it is TOML");
+        let mut bench = TomlFile::read(&path).expect("it is TOML");
         assert!(bench.is_unchanged());
         bench.set(&["devices", "arm"], "home", numbers(&[0.123_46, -1e-9], 4)).expect("a table");
         bench.set(&["limits"], "workspace_min_m", numbers(&[0.1], 4)).expect("a table");
@@ -313,7 +313,7 @@ linear_m_per_s = 0.05
     #[test]
     fn a_section_that_is_no_table_is_refused() {
         let path = file("table");
-        let mut bench = BenchFile::read(&path).expect("it is TOML");
+        let mut bench = TomlFile::read(&path).expect("it is TOML");
         let message = bench.set(&["bind", "arm"], "home", 1).expect_err("a text");
         assert!(message.starts_with("`bind.arm` of"), "{message}");
         fs::remove_file(path).expect("it is there");
@@ -333,7 +333,7 @@ linear_m_per_s = 0.05
         for (before, after) in cases {
             let path = file("list");
             fs::write(&path, format!("[limits]\nkeep_out = {before} # mine\n")).expect("a file");
-            let mut bench = BenchFile::read(&path).expect("it is TOML");
+            let mut bench = TomlFile::read(&path).expect("it is TOML");
             let rows = std::iter::once(Value::Array(numbers(&[3.5], 4))).collect();
             bench.extend(&["limits"], "keep_out", rows).expect("a list");
             assert_eq!(bench.changes(), format!("[limits]\nkeep_out = {after}"));
@@ -379,7 +379,7 @@ linear_m_per_s = 0.05
         for (before, after) in cases {
             let path = file("tables");
             fs::write(&path, format!("[bind]\narm = \"arm\"\n{before}")).expect("a file");
-            let mut bench = BenchFile::read(&path).expect("it is TOML");
+            let mut bench = TomlFile::read(&path).expect("it is TOML");
             let tables = ArrayOfTables::from_iter([contact("pen", 7.0)]);
             bench.set_tables(&["facts", "arm"], "contacts", tables).expect("a table");
             assert_eq!(bench.text(), format!("[bind]\narm = \"arm\"\n{after}"));
@@ -392,7 +392,7 @@ linear_m_per_s = 0.05
     fn line_ends_stay() {
         let path = file("ends");
         fs::write(&path, BENCH.replace('\n', "\r\n")).expect("a file");
-        let mut bench = BenchFile::read(&path).expect("it is TOML");
+        let mut bench = TomlFile::read(&path).expect("it is TOML");
         bench.set(&["limits"], "force_n", 1.5).expect("a table");
         bench.write().expect("it is written");
         let expected = format!("{BENCH}force_n = 1.5\n").replace('\n', "\r\n");
@@ -406,7 +406,7 @@ linear_m_per_s = 0.05
         let [victim, link] = ["toml.victim", "toml.new"].map(|end| path.with_extension(end));
         fs::write(&victim, "mine").expect("a file");
         std::os::unix::fs::symlink(&victim, &link).expect("a link");
-        let mut bench = BenchFile::read(&path).expect("it is TOML");
+        let mut bench = TomlFile::read(&path).expect("it is TOML");
         bench.set(&["limits"], "force_n", 1.5).expect("a table");
         let mut permissions = fs::metadata(&path).expect("it is there").permissions();
         let writable = permissions.clone();
@@ -426,7 +426,7 @@ linear_m_per_s = 0.05
         fs::create_dir_all(&folder).expect("a folder");
         let path = folder.join("cell.toml");
         fs::write(&path, "[bind]\npad = \"pad\"\n\n[devices.pad]\ntype = \"mock_pad\"\n").expect("a file");
-        let mut bench = BenchFile::read(&path).expect("it is TOML");
+        let mut bench = TomlFile::read(&path).expect("it is TOML");
         bench.set(&["devices", "pad", "mount"], "xyz", numbers(&[0.0, 0.0, 0.03], 4)).expect("a table");
         bench.check(&crate::catalogue()).expect("it loads");
         bench.set(&["devices", "pad"], "unheard_of", 1).expect("a table");
