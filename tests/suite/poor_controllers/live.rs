@@ -1,4 +1,4 @@
-//! Ranges of `[live]`, and what else becomes poor by what others do: an operator, a guide, or the object.
+//! Ranges of `[live]`, and what else becomes poor by what others do: an operator, a guide, a mode, or the object.
 
 use super::variant::{Variant, on, variant};
 
@@ -23,6 +23,27 @@ pub(super) fn poor_by_others() -> Vec<(&'static str, Variant)> {
         ("unreachable-setpoint", pressure("{ min = 0.05, max = 5.0, rate = 0.1 }")),
         ("unreachable-setpoint", pressure("{ min = 0.005, max = 0.2, rate = 0.1 }")),
         ("unreachable-setpoint", pressure("{ min = 0.05, max = 2.95, rate = 0.1 }")),
+        // The noise of the spare force, and spare forces that the limit does not let the sensor press.
+        (
+            "unfiltered-derivative",
+            variant(
+                "hold_without_slip",
+                &[
+                    "-time_constant_ms",
+                    "set nodes.calm.type=\"delay\"",
+                    "set nodes.calm.unit=\"N\"",
+                    "gains.spare = { kp = 2.0, kd = 0.02 }",
+                ],
+            ),
+        ),
+        ("unreachable-setpoint", variant("hold_without_slip", &["setpoint = { spare = 16.0 }"])),
+        (
+            "unreachable-setpoint",
+            variant("hold_without_slip", &["least_force = 1.0", "set modes.servo.set.grip.least_force=20.0"]),
+        ),
+        ("wrong-column", variant("hold_without_slip", &["columns.spare = [0, 0, -0.004, 0, 0, 0]"])),
+        // A pressure that is hardly above the threshold of the pad.
+        ("unreachable-setpoint", variant("edge", &["set nodes.error.setpoint.pressure=0.0155"])),
         // Nothing holds the angle of a pen that is longer than the pad.
         ("line-position", on("pen", variant("position", &["set devices.bench.objects.0.length=0.3"]))),
         // The guide rolls the sensor, and nothing presses.
@@ -43,6 +64,8 @@ pub(super) fn good_by_others() -> Vec<Variant> {
             ],
         ),
         pressure("{ min = 0.05, max = 0.2, rate = 0.1 }"),
+        variant("hold_without_slip", &["gains.spare = { kp = 9.5, kd = 0.1 }"]),
+        variant("hold_without_slip", &["setpoint = { spare = 5.0 }"]),
         on("pen", variant("position", &[])),
         guided(ROLLS, "[0, 0, 1, 0, 0, 0]", &[]),
         guided(ROLLS, RESTS, &["set nodes.guidance.angular_rad_per_s=0.0"]),

@@ -27,6 +27,27 @@ pub(super) fn poor_pairs() -> Vec<(&'static str, Variant)> {
                 "set nodes.soft.hysteresis=0.1",
             ]),
         ),
+        // One flag that is made of both.
+        (
+            "unused-column",
+            variant(
+                "hybrid",
+                &[
+                    "set nodes.firm.type=\"compare\"",
+                    "set nodes.firm.in.value=\"touch.force\"",
+                    "set nodes.firm.above=1.0",
+                    "set nodes.soft.type=\"not\"",
+                    "set nodes.soft.in.flag=\"firm.is_met\"",
+                    "set nodes.both.type=\"all\"",
+                    "set nodes.both.in.firm=\"firm.is_met\"",
+                    "set nodes.both.in.soft=\"soft.is_met\"",
+                    "set nodes.passed.type=\"gate\"",
+                    "set nodes.passed.in.value=\"touch.x\"",
+                    "set nodes.passed.in.gate=\"both.is_met\"",
+                    "set nodes.error.in.x=\"passed.value\"",
+                ],
+            ),
+        ),
         (
             "opposed-motion",
             with_feature(

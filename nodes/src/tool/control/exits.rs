@@ -69,7 +69,34 @@ impl<'a> Exit<'a> {
         self.when().is_some_and(|port| port.ends_with(".present"))
     }
 
+    /// Returns one of its entries, if that is a word. `true` and `false` are words too.
     fn word(self, key: &str) -> Option<&'a str> {
-        self.entry(key)?.as_str()
+        let value = self.entry(key)?;
+        match value.item {
+            Item::Boolean(true) => Some("true"),
+            Item::Boolean(false) => Some("false"),
+            _ => value.as_str(),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use tactflow_runtime::graph::{Request, compile};
+
+    use super::*;
+
+    #[test]
+    fn an_exit_waits_for_the_end_of_a_contact_however_that_is_written() {
+        let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../graphs/hybrid.toml");
+        for (is, expected) in [("", false), ("is = true, ", false), ("is = false, ", true), ("is = \"absent\", ", true)]
+        {
+            let exit = format!("modes.servo.go={{ to = \"approach\", when = \"touch.present\", {is}for_ms = 2000 }}");
+            let compiled = compile(&crate::catalogue(), &Request::file(path).set(exit));
+            let compiled = compiled.unwrap_or_else(|report| panic!("{}", report.render(false)));
+            let servo = compiled.outline().modes.iter().find(|mode| mode.name == "servo").unwrap();
+            let exit = exits(servo, "go").next().unwrap();
+            assert_eq!((exit.is_lost(), exit.is_found()), (expected, !expected), "{is}");
+        }
     }
 }

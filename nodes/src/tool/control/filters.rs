@@ -6,6 +6,9 @@ use tactflow_runtime::graph::OutlinedBlock;
 use super::nodes::{Nodes, source};
 use super::shape::Shape;
 
+/// What a division of times leaves beyond a whole number [1].
+const ROUNDING: f64 = 1e-6;
+
 /// A filter of a feature.
 #[derive(Debug, Clone, Serialize)]
 pub(crate) struct Filter {
@@ -77,12 +80,15 @@ fn follow<'a>(nodes: &Nodes<'a>, port: &str, path: &mut Vec<&'a str>) -> Option<
             found.gates.extend(source(node, "gate").map(str::to_owned));
             Some(found)
         }),
-        kind => shape(nodes, node).zip(source(node, "value")).map_or_else(measured, |(shape, value)| {
-            let mut found = follow(nodes, value, path)?;
-            let delay_s = shape.delay(node.sample_s);
-            found.filters.push(Filter { node: node.name.clone(), kind: kind.to_owned(), delay_s, shape });
-            Some(found)
-        }),
+        kind => shape(nodes, node, |key| nodes.number(node, key)).zip(source(node, "value")).map_or_else(
+            measured,
+            |(shape, value)| {
+                let mut found = follow(nodes, value, path)?;
+                let delay_s = shape.delay(node.sample_s);
+                found.filters.push(Filter { node: node.name.clone(), kind: kind.to_owned(), delay_s, shape });
+                Some(found)
+            },
+        ),
     };
     path.pop();
     found
@@ -105,11 +111,11 @@ fn slower(sides: &[(Way, bool)]) -> Option<Way> {
     })
 }
 
-/// Returns the filter that a node is.
-fn shape(nodes: &Nodes<'_>, node: &OutlinedBlock) -> Option<Shape> {
-    let number = |path: &str| nodes.number(node, path);
+/// Returns the filter that a node is with these parameters.
+pub(crate) fn shape(nodes: &Nodes<'_>, node: &OutlinedBlock, number: impl Fn(&str) -> Option<f64>) -> Option<Shape> {
     let samples = |usual: f64| match number("window_ms") {
-        Some(ms) => (ms * 1e-3 / node.sample_s).round().max(1.0),
+        // Those that are less than the window older than the newest one.
+        Some(ms) => libm::ceil(ms * 1e-3 / node.sample_s - ROUNDING).max(1.0),
         None => number("window").unwrap_or(usual),
     };
     match node.kind.text.as_str() {

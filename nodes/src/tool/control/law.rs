@@ -153,6 +153,11 @@ impl Feature {
         self.measured.as_ref()?.rsplit('.').next()
     }
 
+    /// Returns the smallest and the largest value of what is measured, where its node states them.
+    pub(crate) fn range(&self, nodes: &Nodes<'_>) -> Option<[f64; 2]> {
+        nodes.output(self.measured.as_deref()?)?.range
+    }
+
     /// Returns the unit of a place or an angle; `None` for any other quantity.
     pub(crate) fn unit(&self) -> Option<&'static str> {
         match self.quantity()? {
@@ -167,11 +172,12 @@ impl Feature {
         Some(if self.unit()? == "m" { PLACE_STEP } else { ANGLE_STEP })
     }
 
-    /// Returns a length or an angle of this feature with its unit, of a place in mm.
+    /// Returns a value of this feature with its unit where that is known, of a place in mm.
     pub(crate) fn in_units(&self, value: f64) -> String {
         match self.unit() {
             Some("m") => format!("{} mm", to_three_digits(1e3 * value)),
-            _ => format!("{} rad", to_three_digits(value)),
+            Some(unit) => format!("{} {unit}", to_three_digits(value)),
+            None => to_three_digits(value).to_string(),
         }
     }
 

@@ -45,8 +45,7 @@ pub(super) fn without_rest(before: [f64; 6], twist: [f64; 6]) -> [f64; 6] {
 pub(crate) fn mount(nodes: &Nodes<'_>, node: &OutlinedBlock) -> Option<Mount> {
     let adjoint = Some(node).filter(|node| node.kind.text == "adjoint")?;
     let twist = source(adjoint, "twist")?;
-    let before = nodes.writer(twist)?.outputs.iter().find(|port| port.name == twist)?;
-    if before.frames != adjoint.outputs.first()?.frames {
+    if nodes.output(twist)?.frames != adjoint.outputs.first()?.frames {
         return None;
     }
     let pose = constant(nodes, source(adjoint, "pose")?)?;

@@ -2,7 +2,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use tactflow_runtime::graph::{Outline, OutlinedBlock, OutlinedMode, Setting};
+use tactflow_runtime::graph::{Outline, OutlinedBlock, OutlinedMode, OutlinedPort, Setting};
 
 /// The exits of a mode, and when it fails: each key with its value as TOML.
 pub(crate) type Ends = Vec<(String, String)>;
@@ -20,7 +20,7 @@ impl<'a> Index<'a> {
     pub(crate) fn new(outline: &'a Outline) -> Self {
         let mut modes = BTreeMap::<&str, Vec<&OutlinedMode>>::new();
         for mode in &outline.modes {
-            modes.entry(mode.name.rsplit_once('.').map_or("", |(task, _)| task)).or_default().push(mode);
+            modes.entry(task(mode)).or_default().push(mode);
         }
         Self {
             outline,
@@ -64,6 +64,11 @@ impl<'a> Nodes<'a> {
         self.node(port.rsplit_once('.')?.0)
     }
 
+    /// Returns what the outline says of a port; `None` for the port of a role.
+    pub(crate) fn output(&self, port: &str) -> Option<&'a OutlinedPort> {
+        self.writer(port)?.outputs.iter().find(|output| output.name == port)
+    }
+
     /// Returns the node with a name.
     pub(crate) fn node(&self, name: &str) -> Option<&'a OutlinedBlock> {
         self.index.nodes.get(name).copied()
@@ -82,19 +87,21 @@ impl<'a> Nodes<'a> {
         found
     }
 
-    /// Returns whether a flag is set in this mode, if it is the flag of a mode, or made of such flags.
+    /// Returns whether a flag is set in this mode, if it is the flag of a mode of the same task, or made of such flags.
     pub(crate) fn is_set(&self, flag: &str) -> Option<bool> {
         if let Some(node) = self.writer(flag) {
             let mut flags = node.wires.iter().map(|wire| self.is_set(&wire.source));
             return match node.kind.text.as_str() {
-                "not" => flags.next()?.map(|is_set| !is_set),
-                "any" => flags.try_fold(false, |any, is_set| Some(any || is_set?)),
-                "all" => flags.try_fold(true, |all, is_set| Some(all && is_set?)),
+                "not" => opposite(flags.next()?),
+                "any" => any(flags),
+                "all" => all(flags),
                 _ => None,
             };
         }
         let mode = self.index.outline.modes.iter().find(|mode| flag == mode_flag(&mode.name))?;
-        Some(self.mode.is_some_and(|own| own.name == mode.name))
+        // Another task can be in any of its modes.
+        let own = self.mode.filter(|own| task(own) == task(mode))?;
+        Some(own.name == mode.name)
     }
 
     /// Returns whether a gate behind a flag is open whatever the sensor feels: the flag is set in this mode.
@@ -121,7 +128,7 @@ impl<'a> Nodes<'a> {
 
     /// Returns the values of a node in this mode: those of its block, and over them those that the mode sets.
     pub(crate) fn values(&self, node: &'a OutlinedBlock) -> impl Iterator<Item = (&'a str, &'a Setting)> {
-        let name = self.mode.and_then(|mode| mode.name.rsplit_once('.')).map_or("", |(task, _)| task);
+        let name = self.mode.map_or("", task);
         let local = node.name.strip_prefix(name).unwrap_or(&node.name).trim_start_matches('.');
         let prefix = format!("set.{local}.");
         let set = self.mode.iter().flat_map(|mode| &mode.settings);
@@ -142,6 +149,33 @@ impl<'a> Nodes<'a> {
     pub(crate) fn number(&self, node: &'a OutlinedBlock, path: &str) -> Option<f64> {
         self.value(node, path)?.value.read()
     }
+}
+
+/// Returns the task of a mode; "" for that of the graph itself.
+fn task(mode: &OutlinedMode) -> &str {
+    mode.name.rsplit_once('.').map_or("", |(task, _)| task)
+}
+
+/// Returns whether one of several flags is set, as far as they are known.
+fn any(flags: impl Iterator<Item = Option<bool>>) -> Option<bool> {
+    let mut found = Some(false);
+    for is_set in flags {
+        match is_set {
+            Some(true) => return Some(true),
+            Some(false) => {}
+            None => found = None,
+        }
+    }
+    found
+}
+
+/// Returns whether all of several flags are set, as far as they are known.
+fn all(flags: impl Iterator<Item = Option<bool>>) -> Option<bool> {
+    opposite(any(flags.map(opposite)))
+}
+
+fn opposite(flag: Option<bool>) -> Option<bool> {
+    flag.map(|is_set| !is_set)
 }
 
 /// Returns the port that is set in a mode: `modes.NAME`, and `TASK.modes.NAME` in a task that is a part.
@@ -182,4 +216,41 @@ pub(crate) fn ends(mode: &OutlinedMode) -> Ends {
 pub(crate) fn toml(setting: &Setting) -> String {
     let value = setting.written.as_ref().unwrap_or(&setting.value);
     toml::Value::try_from(value).map_or_else(|error| error.to_string(), |value| value.to_string())
+}
+
+#[cfg(test)]
+mod tests {
+    use tactflow_runtime::graph::{Request, compile};
+
+    use super::*;
+
+    #[test]
+    fn the_mode_of_another_task_is_not_known() {
+        let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../graphs/carry.toml");
+        let compiled = compile(&crate::catalogue(), &Request::file(path));
+        let compiled = compiled.unwrap_or_else(|report| panic!("{}", report.render(false)));
+        let index = Index::new(compiled.outline());
+        let modes = index.modes("left");
+        let mode = modes.iter().flatten().find(|mode| mode.name == "left.hold").unwrap();
+        let nodes = Nodes::new(&index, Some(mode));
+        let flags = ["left.modes.hold", "left.modes.press", "right.modes.hold", "right.modes.press"];
+        assert_eq!(flags.map(|flag| nodes.is_set(flag)), [Some(true), Some(false), None, None]);
+    }
+
+    #[test]
+    fn what_is_made_of_flags_is_known_in_each_order() {
+        let cases = [
+            ([Some(true), None], Some(true), None),
+            ([Some(false), None], None, Some(false)),
+            ([Some(true), Some(false)], Some(true), Some(false)),
+            ([Some(true), Some(true)], Some(true), Some(true)),
+            ([None, None], None, None),
+        ];
+        for (flags, is_any, is_all) in cases {
+            for flags in [flags, [flags[1], flags[0]]] {
+                let found = (any(flags.into_iter()), all(flags.into_iter()));
+                assert_eq!(found, (is_any, is_all), "{flags:?}");
+            }
+        }
+    }
 }

@@ -7,9 +7,6 @@ use super::contacts::Answer;
 use super::filters::way;
 use super::nodes::{Nodes, source};
 
-/// Smallest and largest factor of a `gain_schedule` that states none [1].
-const DEFAULT_FACTORS: [f64; 2] = [0.2, 1.0];
-
 /// A node that multiplies the gains of a feature by a factor, which depends on the contact.
 #[derive(Debug, Clone, Serialize)]
 pub(crate) struct Schedule {
@@ -30,8 +27,7 @@ impl Schedule {
         if !features.iter().any(|name| name == feature) {
             return None;
         }
-        let number = |key: &str, usual: f64| nodes.number(node, key).unwrap_or(usual);
-        let [min, max] = [number("min", DEFAULT_FACTORS[0]), number("max", DEFAULT_FACTORS[1])];
+        let (min, max) = (nodes.number(node, "min")?, nodes.number(node, "max")?);
         Some(Self { node: node.name.clone(), min, max, nominal: nominal(nodes, node, measured?) })
     }
 

@@ -73,12 +73,12 @@ struct Motion {
     of: String,
     /// The limiters and conversions from the task's twist to the command, in this order.
     limits: Vec<Limiter>,
-    modes: Vec<ModeLaw>,
+    modes: Vec<ModeSummary>,
 }
 
 /// What moves an arm in one mode.
 #[derive(Debug, Serialize)]
-struct ModeLaw {
+struct ModeSummary {
     /// Name of the mode; `None` in a graph without modes.
     mode: Option<String>,
     #[serde(flatten)]
@@ -160,10 +160,10 @@ fn motion(compiled: &Compiled, index: &Index<'_>, of: String, command: Command<'
     let Command { arm, port } = command;
     let Chain { limits, twist, mounts } = chain(&Nodes::new(index, None), port)?;
     let declared = contacts(compiled.facts(), arm)?;
-    let modes = index.modes(index.task_of(port)).into_iter().map(|mode| {
+    let modes = index.modes(index.task_of(&twist)).into_iter().map(|mode| {
         let nodes = Nodes::new(index, mode);
         let law = law_behind(&nodes, &twist, &mounts);
-        Ok(ModeLaw {
+        Ok(ModeSummary {
             mode: mode.map(|mode| mode.name.clone()),
             latencies: latencies(&declared, &law),
             loops: stability(&declared, &law),

@@ -7,7 +7,7 @@ use tactflow_runtime::cli::table;
 
 use super::approaches::{Approach, Swing};
 use super::stability::{Play, Stability};
-use super::{Explained, ModeLaw, Motion, latency};
+use super::{Explained, ModeSummary, Motion, latency};
 use crate::motion::COMPONENTS;
 use crate::tool::control::digits::or_none;
 use crate::tool::control::law::Feature;
@@ -69,7 +69,7 @@ fn page(graph: &Path, explained: &Explained, style: &Style) -> String {
     text
 }
 
-fn law(mode: &ModeLaw, style: &Style) -> String {
+fn law(mode: &ModeSummary, style: &Style) -> String {
     let law = &mode.law;
     let mut text = String::new();
     let rows: Vec<[String; 11]> = law.features.iter().filter(|one| one.moves()).map(row).collect();

@@ -47,7 +47,7 @@ impl<'a> Arm<'a> {
         contacts: Vec<Contact>,
     ) -> Option<Self> {
         let Chain { limits, twist, mounts } = chain(&Nodes::new(index, None), command.port).ok()?;
-        let task = index.task_of(command.port);
+        let task = index.task_of(&twist);
         let modes = index.modes(task).into_iter().map(|mode| {
             let nodes = Nodes::new(index, mode);
             ModeLaw { mode, carried, nodes, law: law_behind(&nodes, &twist, &mounts) }
@@ -95,7 +95,8 @@ impl<'a> Arm<'a> {
     pub(super) fn force_limit(&self, mode: &ModeLaw<'_>, quantity: &str) -> Option<(f64, String)> {
         let limit = match quantity {
             "pressure" => "peak",
-            "force" => "force",
+            // The spare force is a part of it.
+            "force" | "spare" => "force",
             _ => return None,
         };
         let limiters = self.limits.iter().filter(|limiter| limiter.kind.ends_with("contact_limit"));

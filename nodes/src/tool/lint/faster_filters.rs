@@ -4,7 +4,7 @@ use std::ops::Range;
 
 use super::mode_law::ModeLaw;
 use crate::tool::control::digits::{down_to_two_digits, to_two_digits};
-use crate::tool::control::filters::Filter;
+use crate::tool::control::filters::{Filter, shape};
 use crate::tool::control::law::Feature;
 use crate::tool::control::shape::Shape;
 
@@ -19,7 +19,9 @@ pub(super) fn time_key(mode: &ModeLaw<'_>, filter: &Filter) -> Option<&'static s
 pub(super) struct Faster {
     node: String,
     key: &'static str,
-    pub(super) value: String,
+    pub(super) value: f64,
+    /// The filter with this value.
+    shape: Shape,
     pub(super) place: Range<usize>,
     /// Whether the old value is written nowhere.
     pub(super) is_default: bool,
@@ -36,9 +38,11 @@ impl Faster {
             "window" => libm::floor(old * share).max(1.0),
             _ => down_to_two_digits(old * share),
         };
+        let number = |path: &str| if path == key { Some(value) } else { mode.nodes.number(node, path) };
+        let shape = shape(&mode.nodes, node, number)?;
         let place = mode.place(&filter.node, key);
         let is_default = place == node.span;
-        Some(Self { node: filter.node.clone(), key, value: value.to_string(), place, is_default })
+        Some(Self { node: filter.node.clone(), key, value, shape, place, is_default })
     }
 
     /// Returns what to write, for a help.
@@ -60,9 +64,14 @@ pub(super) fn faster(
         filter.shape.smooths() && time_key(mode, filter).is_some()
     };
     let all: Vec<usize> = (0..feature.filters.len()).filter(is_written).collect();
-    let good = |which: &[usize]| shares().find(|share| is_good(&with(feature, which, *share)));
-    let (share, which) = [vec![slowest], all].into_iter().find_map(|which| Some((good(&which)?, which)))?;
-    which.into_iter().map(|i| Faster::of(mode, &feature.filters[i], share)).collect()
+    let made = |which: &[usize], share: f64| -> Option<Vec<Faster>> {
+        which.iter().map(|i| Faster::of(mode, &feature.filters[*i], share)).collect()
+    };
+    let good = |which: Vec<usize>| {
+        let mut all = shares().filter_map(|share| made(&which, share));
+        all.find(|all| is_good(&with(feature, &which, all)))
+    };
+    [vec![slowest], all].into_iter().find_map(good)
 }
 
 /// Returns the parts of a delay that are tried, down to a hundredth.
@@ -70,15 +79,9 @@ fn shares() -> impl Iterator<Item = f64> {
     std::iter::successors(Some(0.8), |share| Some(share * 0.8)).take(20)
 }
 
-/// Returns a feature with a part of the delay of some of its filters.
-fn with(feature: &Feature, which: &[usize], share: f64) -> Feature {
+/// Returns a feature with some of its filters as they are made.
+fn with(feature: &Feature, which: &[usize], made: &[Faster]) -> Feature {
     let mut feature = feature.clone();
-    for i in which {
-        match &mut feature.filters[*i].shape {
-            Shape::LowPass { time } => *time *= share,
-            Shape::Mean { samples } | Shape::Median { samples } => *samples = libm::floor(*samples * share).max(1.0),
-            Shape::Delay { .. } => {}
-        }
-    }
+    which.iter().zip(made).for_each(|(i, faster)| feature.filters[*i].shape = faster.shape);
     feature
 }

@@ -31,7 +31,11 @@ fn resting(arm: &Arm<'_>, mode: &ModeLaw<'_>, feature: &Feature) -> Option<Diagn
     let name = &feature.name;
     let message = format!("the gain `kp` of `{name}` is 0 1/s: nothing corrects the error");
     let help = format!("write a gain greater than 0, or remove the wire of `{name}` to stop controlling it");
-    Some(Diagnostic::new(Code::UnusualGain, mode.place_of_gain(feature, "kp"), message).help(help))
+    // A gain that is written nowhere has no place of its own.
+    let pid = feature.pid.as_deref().and_then(|pid| mode.nodes.node(pid));
+    let gain = mode.place_of_gain(feature, "kp");
+    let place = if pid.is_some_and(|pid| pid.span == gain) { mode.place_of_column(feature) } else { gain };
+    Some(Diagnostic::new(Code::UnusualGain, place, message).help(help))
 }
 
 /// Gain of a loop that needs a minute for two thirds of an error [1/s].
@@ -166,6 +170,18 @@ fn windup(arm: &Arm<'_>, mode: &ModeLaw<'_>, feature: &Feature) -> Option<Diagno
          winds up while the contact sticks or the object moves, and overshoots"
     );
     let (within, key) = if number("within").is_some() { ("a smaller `within`", "within") } else { ("`within`", "ki") };
-    let help = format!("write {within} in the gains of `{name}`, about five times its noise");
+    let example = usual_within(mode, feature).filter(|within| is_bound(*within));
+    let example = example.map(|within| format!(", for example `within = {within}`")).unwrap_or_default();
+    let help = format!("write {within} in the gains of `{name}`, about five times its noise{example}");
     Some(Diagnostic::new(Code::Windup, mode.place_of_gain(feature, key), message).help(help))
+}
+
+/// Returns an error below which a feature is usually integrated: more than its noise, and much less than a step.
+fn usual_within(mode: &ModeLaw<'_>, feature: &Feature) -> Option<f64> {
+    match mode.quantity(feature)? {
+        "x" | "y" => Some(0.002),
+        "orientation" => Some(0.05),
+        quantity if is_force(quantity) => feature.setpoint.map(|setpoint| to_two_digits(0.2 * setpoint, libm::floor)),
+        _ => None,
+    }
 }

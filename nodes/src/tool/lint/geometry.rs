@@ -50,6 +50,7 @@ const Y: &[KnownSign] = &[
     known(3, 1.0, "a contact rolls along +y when the sensor turns about +x"),
 ];
 const FORCE: &[KnownSign] = &[known(2, 1.0, "the force grows when the sensor moves along +z, toward the object")];
+const SPARE: &[KnownSign] = &[known(2, 1.0, "the spare force grows when the sensor moves along +z, toward the object")];
 const AREA: &[KnownSign] = &[known(2, 1.0, "the area grows when the sensor moves along +z, toward the object")];
 const DRAG_X: &[KnownSign] = &[known(0, -1.0, "an object drags the pad along -x when the sensor moves along +x")];
 const DRAG_Y: &[KnownSign] = &[known(1, -1.0, "an object drags the pad along -y when the sensor moves along +y")];
@@ -84,6 +85,7 @@ impl Geometry {
             "y" => (Y, true, OF_Y),
             force if is_force(force) => (FORCE, true, OF_FORCE),
             "orientation" => (ANGLE, true, NONE),
+            "spare" => (SPARE, false, NONE),
             "area" => (AREA, false, NONE),
             "fx" => (DRAG_X, false, NONE),
             "fy" => (DRAG_Y, false, NONE),

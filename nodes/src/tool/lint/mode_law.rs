@@ -10,7 +10,8 @@ use crate::tool::control::law::{Feature, Guidance, Law};
 use crate::tool::control::nodes::{Nodes, source};
 
 /// Types of the nodes that measure a contact, and whose geometry is known.
-const MEASURING: [&str; 6] = ["moments", "principal_axes", "hough", "curvature", "shear", "contact_area"];
+const MEASURING: [&str; 7] =
+    ["moments", "principal_axes", "hough", "curvature", "shear", "contact_area", "friction_margin"];
 
 /// What moves an arm in one mode.
 pub(super) struct ModeLaw<'a> {
@@ -55,15 +56,14 @@ impl<'a> ModeLaw<'a> {
     /// Returns what a port measures, under the same conditions.
     pub(super) fn quantity_of<'p>(&self, port: &'p str) -> Option<&'p str> {
         let node = self.nodes.writer(port)?;
-        let frame = node.outputs.iter().find(|output| output.name == port)?.frames.first()?.as_deref()?;
+        let frame = self.nodes.output(port)?.frames.first()?.as_deref()?;
         let is_known = MEASURING.contains(&&*node.kind.text) && self.carried.contains(frame);
         is_known.then(|| port.rsplit('.').next())?
     }
 
     /// Returns the smallest and the largest value of what a feature measures, where its node states them.
     pub(super) fn range(&self, feature: &Feature) -> Option<[f64; 2]> {
-        let port = feature.measured.as_deref()?;
-        self.nodes.writer(port)?.outputs.iter().find(|output| output.name == port)?.range
+        feature.range(&self.nodes)
     }
 
     /// Returns the largest distance of a measurement from its setpoint, where its node states the range of its values.

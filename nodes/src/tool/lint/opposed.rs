@@ -7,6 +7,7 @@ use super::geometry::is_force;
 use super::guides::{holds, may_press, parks};
 use super::mode_law::ModeLaw;
 use crate::motion::COMPONENTS;
+use crate::tool::control::digits::to_two_digits;
 use crate::tool::control::exits::Exit;
 use crate::tool::control::law::{Feature, Guidance};
 
@@ -128,12 +129,12 @@ fn pressed(arm: &Arm<'_>, mode: &ModeLaw<'_>) -> Option<Diagnostic> {
     };
     let feature = mode.moving().find(is_shifted)?;
     let message = format!(
-        "{}`{}` moves the sensor into the object with {speed} m/s beside the control of `{}`, which then rests {:.3} above its \
+        "{}`{}` moves the sensor into the object with {speed} m/s beside the control of `{}`, which then rests {} above its \
          setpoint",
         mode.prefix(),
         constant.node,
         feature.name,
-        shift(feature)
+        to_two_digits(shift(feature), libm::round)
     );
     let help = format!("set 0 for `vz` of `{}` in this mode: the control of the force presses", constant.node);
     Some(Diagnostic::new(Code::OpposedMotion, mode.place(&constant.node, "twist"), message).help(&*help))
@@ -241,7 +242,7 @@ fn divided(mode: &ModeLaw<'_>) -> Option<Diagnostic> {
     let (one, other, i) = pairs.into_iter().find_map(|(one, other)| Some((one, other, shared(one, other)?)))?;
     let [first, second] = [one, other].map(|feature| {
         let setpoint = feature.setpoint.unwrap_or_default();
-        feature.unit().map_or_else(|| setpoint.to_string(), |_| feature.in_units(setpoint))
+        feature.in_units(setpoint)
     });
     let message = format!(
         "{}`{}` and `{}` both move `{}` by `{}`, one toward {first} and the other one toward {second}: it cannot rest at both",

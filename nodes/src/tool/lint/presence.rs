@@ -68,30 +68,51 @@ fn reader(arm: &Arm<'_>, port: &str) -> Option<String> {
 }
 
 /// Returns the flag that keeps a feature from moving the sensor in a mode, why, and what mends it if that is known.
-fn barred<'f>(arm: &Arm<'_>, mode: &ModeLaw<'_>, feature: &'f Feature) -> Option<(&'f str, String, Option<String>)> {
+fn barred<'f>(arm: &Arm<'_>, mode: &ModeLaw<'f>, feature: &'f Feature) -> Option<(&'f str, String, Option<String>)> {
     let exclusive = || {
-        let (one, other) = contradiction(mode, &feature.gates)?;
-        let mend = format!("remove one of the two gates of `{}`, or change the bounds of what sets them", feature.name);
-        Some((one, format!("and at the same time `{other}`, but both are never set together"), Some(mend)))
+        let [(gate, one), (other_gate, other)] = contradiction(mode, &feature.gates)?;
+        let (why, mend) = match gate == other_gate {
+            true => {
+                (format!("which needs `{one}` and `{other}`"), format!("remove one of these two flags from `{gate}`"))
+            }
+            false => (
+                format!("and at the same time `{other_gate}`"),
+                format!("remove one of the two gates of `{}`", feature.name),
+            ),
+        };
+        let (why, mend) =
+            (why + ", but both are never set together", mend + ", or change the bounds of what sets them");
+        Some((gate, why, Some(mend)))
     };
-    let closed = feature.gates.iter().find_map(|gate| match mode.nodes.is_set(gate) {
+    let why_closed = |flag: &str| match mode.nodes.is_set(flag) {
         Some(true) => None,
-        Some(false) => Some((&**gate, "which is set in another mode only".to_owned(), None)),
-        None if is_without_contact(mode, gate) => {
-            Some((&**gate, "which is set without a contact only".to_owned(), None))
-        }
-        None => out_of_reach(arm, mode, gate).map(|(why, mend)| (&**gate, why, Some(mend))),
+        Some(false) => Some(("which is set in another mode only".to_owned(), None)),
+        None if is_without_contact(mode, flag) => Some(("which is set without a contact only".to_owned(), None)),
+        None => out_of_reach(arm, mode, flag).map(|(why, mend)| (why, Some(mend))),
+    };
+    let closed = feature.gates.iter().find_map(|gate| {
+        let (why, mend) = needed(mode, gate).into_iter().find_map(why_closed)?;
+        Some((&**gate, why, mend))
     });
     closed.or_else(exclusive)
 }
 
-/// Returns two flags of which one is always off, of those that a feature passes.
-fn contradiction<'f>(mode: &ModeLaw<'_>, gates: &'f [String]) -> Option<(&'f str, &'f str)> {
-    let pairs = gates.iter().enumerate().flat_map(|(at, one)| gates[at + 1..].iter().map(move |other| (one, other)));
-    let exclude = |one: &str, other: &str| is_opposite(mode, one, other) || is_opposite(mode, other, one);
-    pairs
-        .map(|(one, other)| (&**one, &**other))
-        .find(|(one, other)| exclude(one, other) || are_apart(mode, one, other) || are_apart(mode, other, one))
+/// Returns two flags of which one is always off, of those that a feature passes, each behind its gate.
+fn contradiction<'f>(mode: &ModeLaw<'f>, gates: &'f [String]) -> Option<[(&'f str, &'f str); 2]> {
+    let flags = gates.iter().flat_map(|gate| needed(mode, gate).into_iter().map(move |flag| (&**gate, flag)));
+    let flags: Vec<(&str, &str)> = flags.collect();
+    let mut pairs =
+        flags.iter().enumerate().flat_map(|(at, one)| flags[at + 1..].iter().map(move |other| [*one, *other]));
+    let exclude = |one: &str, other: &str| is_opposite(mode, one, other) || are_apart(mode, one, other);
+    pairs.find(|[(_, one), (_, other)]| exclude(one, other) || exclude(other, one))
+}
+
+/// Returns the flags that are set whenever a flag is: those of which `all` makes it, or itself.
+fn needed<'f>(mode: &ModeLaw<'f>, flag: &'f str) -> Vec<&'f str> {
+    match mode.nodes.writer(flag).filter(|node| node.kind.text == "all") {
+        Some(all) => all.wires.iter().flat_map(|wire| needed(mode, &wire.source)).collect(),
+        None => vec![flag],
+    }
 }
 
 /// Returns whether a flag is the opposite of another one.

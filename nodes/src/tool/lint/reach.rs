@@ -18,8 +18,8 @@ pub(super) fn check(arm: &Arm<'_>) -> Diagnostics {
         found.extend(mode.moving().filter_map(|feature| always_resting(arm, mode, feature)));
         found.extend(mode.moving().filter_map(|feature| beside_window(mode, feature)));
         found.extend(exit_bounds(arm, mode));
+        found.extend(thresholds(arm, mode));
     }
-    found.extend(arm.modes.first().into_iter().flat_map(|mode| thresholds(arm, mode)));
     found
 }
 
@@ -42,6 +42,9 @@ fn thresholds(arm: &Arm<'_>, mode: &ModeLaw<'_>) -> Diagnostics {
     });
     never.collect()
 }
+
+/// Multiple of a threshold up to which a pressure hardly keeps its contact [1].
+const ABOVE: f64 = 1.05;
 
 /// Share of a limit from which on noise and overshoot reach it at a setpoint [1].
 const NEAR: f64 = 0.95;
@@ -90,8 +93,8 @@ pub(super) fn unreachable<'a>(arm: &Arm<'_>, mode: &ModeLaw<'a>, feature: &Featu
     }
     let dropped = DROPPED.iter().find(|dropped| dropped.quantity == quantity)?;
     let (threshold, node, key) = least_felt(mode, feature, dropped)?;
-    // A tactel at the threshold counts, and the mean of several that are still there lies above it.
-    let is_below = setpoint < threshold || quantity == "pressure" && setpoint == threshold;
+    // The mean of the tactels that are still there lies above the threshold.
+    let is_below = setpoint < threshold || quantity == "pressure" && setpoint <= ABOVE * threshold;
     (is_below && !lets_go(arm, mode)).then_some(Unreachable::BelowThreshold {
         threshold,
         node,
@@ -125,8 +128,12 @@ pub(super) fn unreachable_setpoint(arm: &Arm<'_>, mode: &ModeLaw<'_>, feature: &
         }
         Unreachable::BelowThreshold { threshold, node, key, what } => (
             format!(
-                "the setpoint of `{name}` is {setpoint}, but `{node}` drops {what} below {threshold}: the contact is lost \
-                 before it is reached"
+                "the setpoint of `{name}` is {setpoint}, but `{node}` drops {what} below {threshold}: {}",
+                if setpoint > threshold {
+                    "the contact is easily lost"
+                } else {
+                    "the contact is lost before it is reached"
+                }
             ),
             format!(
                 "write a setpoint well above {threshold}{}, or a smaller `{key}` of `{node}`",

@@ -16,6 +16,7 @@ use crate::tool::control::filters::Filter;
 use crate::tool::control::law::Feature;
 use crate::tool::control::margins::{Margins, margins, rough_margins};
 use crate::tool::control::response::Loop;
+use crate::tool::control::shape::Shape;
 
 /// What a loop has to keep over each contact.
 pub(super) const KEPT: Wanted = Wanted { peak: 1.8, gain_db: 8.0, phase_deg: 0.0 };
@@ -106,13 +107,12 @@ pub(super) fn is_known(mode: &ModeLaw<'_>, feature: &Feature, contacts: &[Contac
 }
 
 /// Returns what makes the loops of two features the same.
-fn key(feature: &Feature) -> (String, String, Vec<u64>) {
-    let numbers = |one: &Feature| {
-        let delays = one.filters.iter().map(|filter| filter.delay_s);
-        one.column.into_iter().chain([one.kp, one.ki, one.kd]).chain(delays).map(f64::to_bits).collect::<Vec<_>>()
+fn key(feature: &Feature) -> String {
+    let of = |one: &Feature| {
+        let shapes: Vec<Shape> = one.filters.iter().map(|filter| filter.shape).collect();
+        format!("{:?}", (one.id(), one.column, [one.kp, one.ki, one.kd], shapes, &one.schedules))
     };
-    let all = std::iter::once(feature).chain(&feature.beside);
-    (feature.jacobian.clone(), feature.name.clone(), all.flat_map(numbers).collect())
+    std::iter::once(feature).chain(&feature.beside).map(of).collect()
 }
 
 fn judge(mode: &ModeLaw<'_>, feature: &Feature, contacts: &[Contact]) -> Option<Diagnostic> {
@@ -340,9 +340,7 @@ fn slow_filter(mode: &ModeLaw<'_>, feature: &Feature, contacts: &[Contact], slow
     let help = format!("write {}, or smaller gains of `{name}`", text.join(" and "));
     // A default is written nowhere, so it has no text to replace.
     let written = changes.into_iter().filter(|change| !change.is_default);
-    Some(
-        written.fold(diagnostic.help(help), |diagnostic, change| {
-            diagnostic.edit(Edit::Replace(change.place, change.value))
-        }),
-    )
+    Some(written.fold(diagnostic.help(help), |diagnostic, change| {
+        diagnostic.edit(Edit::Replace(change.place, change.value.to_string()))
+    }))
 }
