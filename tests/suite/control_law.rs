@@ -244,3 +244,19 @@ fn contacts_that_are_none_are_refused_with_an_example() {
     assert_eq!(wrong.code, 2);
     assert!(wrong.err.contains("missing field `object`") && wrong.err.contains("for example"), "{}", wrong.err);
 }
+
+#[test]
+fn the_window_of_a_mean_has_as_many_samples_as_its_node_keeps() {
+    // Those that are less than the window older than the newest one. The delay is half of the time between them.
+    for (window_ms, samples) in [(16.0, 4.0), (17.0, 5.0), (20.0, 5.0), (3.0, 1.0)] {
+        let window = format!("--set=nodes.mean.window_ms={window_ms:?}");
+        let nodes = ["--set=nodes.mean.type=moving_average", "--set=nodes.mean.in.value=touch.pressure", &window];
+        let explained =
+            explained(&[&["graphs/edge.toml"], &nodes[..], &["--set=nodes.calm.in.value=mean.value"]].concat());
+        let features = explained["motions"][0]["modes"][1]["features"].as_array().unwrap();
+        let mut filters = features.iter().flat_map(|feature| feature["filters"].as_array().unwrap());
+        let mean = filters.find(|filter| filter["node"] == "mean").unwrap();
+        let expected = 0.5 * (samples - 1.0) * 0.004;
+        assert!((mean["delay_s"].as_f64().unwrap() - expected).abs() < 1e-9, "{window_ms} ms: {mean}");
+    }
+}

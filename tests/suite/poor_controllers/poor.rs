@@ -18,6 +18,19 @@ pub(super) fn poor_behind_nodes() -> Vec<(&'static str, Variant)> {
         ("low-margin", with(feature("touch.present"), &["gains.x = { kp = 17.5 }"])),
         ("unfiltered-derivative", with(feature("touch.present"), &["gains.x = { kp = 3.5, kd = 0.1 }"])),
         ("unused-column", other("no.is_met")),
+        (
+            "unused-column",
+            with(
+                feature("both.is_met"),
+                &[
+                    "set nodes.no.type=\"not\"",
+                    "set nodes.no.in.flag=\"touch.present\"",
+                    "set nodes.both.type=\"all\"",
+                    "set nodes.both.in.no=\"no.is_met\"",
+                    "set nodes.both.in.mode=\"modes.servo\"",
+                ],
+            ),
+        ),
         // A delay smooths nothing.
         (
             "unfiltered-derivative",

@@ -84,7 +84,7 @@ pub(crate) fn factor(loops: &[Loop], wanted: Wanted) -> Option<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::tool::control::contacts::Answer;
+    use crate::tool::control::contacts::{Answer, Contact};
     use crate::tool::control::law::Feature;
 
     fn around(gain: f64, delay: f64) -> Loop {
@@ -141,6 +141,27 @@ mod tests {
         let (with, without) = (with_integral(2.0, 0.05, 0.2), around(2.0, 0.05));
         let [with, without] = [with, without].map(|one| factor(&[one], Wanted::default()).unwrap());
         assert!(with < without && with > 0.8 * without, "{with} and {without}");
+    }
+
+    #[test]
+    fn a_loop_beside_does_not_bound_the_gains_that_are_tried() {
+        // The loop beside has nine times the gain. In the period of 10 ms the own gain ends at 50 1/s times the answer.
+        let feature = |name: &str, kp: f64| Feature {
+            name: name.into(),
+            column: [0.0, 0.0, 1.0, 0.0, 0.0, 0.0],
+            kp,
+            period_s: 0.01,
+            measured: Some("moments.pressure".into()),
+            ..Feature::default()
+        };
+        let both = Feature { beside: vec![feature("other", 9.0)], ..feature("pressure", 1.0) };
+        let mut contact = Contact::unmeasured("ball".into());
+        contact.features.insert("pressure".into(), Answer { vz: Some(0.1), ..Answer::default() });
+        contact.latency_ms = 10.0;
+        let around = Loop::over(&both, &contact).unwrap();
+        let wanted = Wanted { peak: 9.0, gain_db: 0.0, phase_deg: 50.0 };
+        let (found, sum) = (factor(std::slice::from_ref(&around), wanted).unwrap(), around.proportional());
+        assert!((sum - 1.0).abs() < 1e-9 && found > 100.0, "{found} and {sum}");
     }
 
     #[test]

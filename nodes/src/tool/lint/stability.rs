@@ -110,7 +110,7 @@ pub(super) fn is_known(mode: &ModeLaw<'_>, feature: &Feature, contacts: &[Contac
 fn key(feature: &Feature) -> String {
     let of = |one: &Feature| {
         let shapes: Vec<Shape> = one.filters.iter().map(|filter| filter.shape).collect();
-        format!("{:?}", (one.id(), one.column, [one.kp, one.ki, one.kd], shapes, &one.schedules))
+        format!("{:?}", (one.id(), one.column, [one.kp, one.ki, one.kd], shapes))
     };
     std::iter::once(feature).chain(&feature.beside).map(of).collect()
 }
