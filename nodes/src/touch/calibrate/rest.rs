@@ -9,8 +9,7 @@ use tactflow_runtime::node::{Mistake, State};
 use tactflow_runtime::signal::ImageShape;
 
 use super::repair::{BadTactel, Flaw};
-use crate::calibration::samples::median;
-use crate::touch::common::halves::Halves;
+use crate::touch::common::halves::{Halves, upper_median};
 
 /// Smallest number of frames of a self-test: each half keeps two readings of each tactel.
 const MIN_FRAMES: usize = 8;
@@ -214,11 +213,11 @@ impl RestTest {
         let mut sorted = std::mem::take(&mut rest.sorted);
         sorted.clear();
         sorted.extend(live().map(|i| self.reading(i, rest).noise));
-        let noise = median(&mut sorted);
+        let noise = upper_median(&mut sorted);
         sorted.clear();
         sorted.extend(live().map(|i| f64::from(rest.tactels[i].changes)));
         // In a pad that mostly repeats its readings, a tactel that repeats them may be sound.
-        let is_telling = 2.0 * median(&mut sorted) >= self.frames as f64;
+        let is_telling = 2.0 * upper_median(&mut sorted) >= self.frames as f64;
         (rest.sorted, rest.has_noise) = (sorted, is_telling);
         (rest.noise, rest.shift, rest.bad_count) = (noise, 0.0, 0);
         rest.bad.clear();

@@ -9,8 +9,7 @@ use tactflow_runtime::node::{
 };
 use tactflow_runtime::signal::{Flag, ImageShape, Unit, VectorImage, VectorImageShape};
 
-use super::common::halves::{FREE, Halves};
-use crate::calibration::samples::median;
+use super::common::halves::{FREE, Halves, upper_median};
 
 /// Converts the readings of a pad with three axes to forces [N]: `force = gain (value - zero)`, along x, y and z.
 ///
@@ -253,7 +252,7 @@ impl CalibrateVectors {
         let medians: [f64; 3] = std::array::from_fn(|axis| {
             rest.sorted.clear();
             rest.sorted.extend(rest.sums.iter().skip(axis).step_by(3).map(variance));
-            median(&mut rest.sorted)
+            upper_median(&mut rest.sorted)
         });
         let most = medians.map(|median| self.halves().largest_drift(median));
         let is_unsteady = |(i, sums): (usize, &[[f64; 2]; 2])| {

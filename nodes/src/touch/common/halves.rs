@@ -27,3 +27,9 @@ impl Halves {
         SIGNIFICANT * self.0.map(of_mean).iter().sum::<f64>().sqrt()
     }
 }
+
+/// Returns the median, of an even count the larger one of the two in the middle, and 0 for no numbers. Sorts them partly.
+pub(crate) fn upper_median(numbers: &mut [f64]) -> f64 {
+    let middle = numbers.len() / 2;
+    if numbers.is_empty() { 0.0 } else { *numbers.select_nth_unstable_by(middle, f64::total_cmp).1 }
+}
