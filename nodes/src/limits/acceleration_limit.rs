@@ -68,8 +68,9 @@ pub struct Outputs {
 pub struct State {
     /// The motion that was reached in the last tick [m/s, rad/s].
     reached: Twist,
-    /// Number of ticks in which the motion was too old, and its largest age in them [ns].
+    /// Number of ticks in which the motion was too old.
     old_ticks: u64,
+    /// Its largest age in these ticks [ns].
     oldest: i64,
 }
 

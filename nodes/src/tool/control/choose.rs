@@ -145,7 +145,7 @@ mod tests {
 
     #[test]
     fn a_loop_beside_does_not_bound_the_gains_that_are_tried() {
-        // The loop beside has nine times the gain. In the period of 10 ms the own gain ends at 50 1/s times the answer.
+        // The loop beside has nine times the gain. If it counted, nothing above a factor of 50 would be tried.
         let feature = |name: &str, kp: f64| Feature {
             name: name.into(),
             column: [0.0, 0.0, 1.0, 0.0, 0.0, 0.0],

@@ -65,6 +65,7 @@ fn follow<'a>(nodes: &Nodes<'a>, port: &str, path: &mut Vec<&'a str>) -> Option<
         return None;
     }
     path.push(&node.name);
+    let own = |key: &str| nodes.number(node, key);
     let found = match node.kind.text.as_str() {
         "switch" => {
             // The other side of a switch that a contact selects passes only without a contact.
@@ -80,15 +81,12 @@ fn follow<'a>(nodes: &Nodes<'a>, port: &str, path: &mut Vec<&'a str>) -> Option<
             found.gates.extend(source(node, "gate").map(str::to_owned));
             Some(found)
         }),
-        kind => shape(nodes, node, |key| nodes.number(node, key)).zip(source(node, "value")).map_or_else(
-            measured,
-            |(shape, value)| {
-                let mut found = follow(nodes, value, path)?;
-                let delay_s = shape.delay(node.sample_s);
-                found.filters.push(Filter { node: node.name.clone(), kind: kind.to_owned(), delay_s, shape });
-                Some(found)
-            },
-        ),
+        kind => shape(nodes, node, own).zip(source(node, "value")).map_or_else(measured, |(shape, value)| {
+            let mut found = follow(nodes, value, path)?;
+            let delay_s = shape.delay(node.sample_s);
+            found.filters.push(Filter { node: node.name.clone(), kind: kind.to_owned(), delay_s, shape });
+            Some(found)
+        }),
     };
     path.pop();
     found

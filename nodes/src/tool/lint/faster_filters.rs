@@ -79,7 +79,7 @@ fn shares() -> impl Iterator<Item = f64> {
     std::iter::successors(Some(0.8), |share| Some(share * 0.8)).take(20)
 }
 
-/// Returns a feature with some of its filters as they are made.
+/// Returns a feature with faster ones in place of some of its filters.
 fn with(feature: &Feature, which: &[usize], made: &[Faster]) -> Feature {
     let mut feature = feature.clone();
     which.iter().zip(made).for_each(|(i, faster)| feature.filters[*i].shape = faster.shape);

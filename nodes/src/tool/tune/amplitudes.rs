@@ -128,7 +128,7 @@ fn runs(experiment: &Experiment<'_>, component: usize, shell: &Shell) -> Result<
             }
             Answered::Nothing { why, is_absent } => {
                 found.is_absent = is_absent;
-                // Gains that hold two smaller motions are not those that lose the place or the angle.
+                // Two smaller motions have not lost the place or the angle: this one is too large, and not the gain.
                 let is_far = is_absent && component != PRESSES && found.runs.len() >= 2;
                 let kind = if is_far { Unknown::Hidden } else { Unknown::Lost };
                 (format!("with a test signal of {amplitude} {unit}, {why}"), kind)

@@ -81,7 +81,7 @@ fn touched(bench: &Stated, name: Option<&str>) -> Result<String, String> {
                 "the bench `{file}` states contacts with {}: measure it as the bench of the graph, and name the object that the \
                  arm touches, for example with `--bench {file} --object {:?}`",
                 quoted(objects),
-                last.object
+                object(last)
             ))
         }
     }

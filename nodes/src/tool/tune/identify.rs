@@ -68,11 +68,10 @@ pub(super) fn identify(experiment: &Experiment<'_>, object: &str, shell: &Shell)
     for component in (0..6).filter(|i| feature.column[*i] != 0.0) {
         let (response, play) = agreed(experiment, component, shell)?;
         found.play = found.play.or_else(|| play.map(|play| to_two_digits(play, libm::round)));
-        let unknown = match response.as_ref().err().map(|refusal| refusal.kind) {
-            // With the same gains, a motion along another component has been answered.
-            Some(Unknown::Lost) if found.fits.is_empty() => Unknown::Lost,
-            Some(Unknown::NotReached) => Unknown::NotReached,
-            _ => Unknown::Hidden,
+        let unknown = match response.as_ref().err().map_or(Unknown::Hidden, |refusal| refusal.kind) {
+            // With the same gains, a motion along another component has not lost the contact.
+            Unknown::Lost if !found.fits.is_empty() => Unknown::Hidden,
+            kind => kind,
         };
         let fitted = response
             .map_err(|refusal| refusal.why)

@@ -142,7 +142,7 @@ fn why_none(feature: &TunedFeature) -> String {
         let [kp, ki, kd] = feature.old;
         let why = match (is_reversed, [ki, kd]) {
             (true, _) => "the motion increases the error".to_owned(),
-            (_, [0.0, 0.0]) => "they are larger than a small gain leaves; ask for smaller ones".to_owned(),
+            (_, [0.0, 0.0]) => "even a small one leaves less; ask for smaller margins".to_owned(),
             _ => format!("with ki = {ki} and kd = {kd} beside kp = {kp} the loop swings; begin with ki = 0 and kd = 0"),
         };
         return format!("No gain keeps the margins: {why}.\n");
