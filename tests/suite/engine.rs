@@ -205,10 +205,16 @@ fn figure(value: &Value) -> f64 {
 
 /// Runs a task on a scene. Returns what the engine saw, and why the run failed, if it did.
 fn run(task: &str, scene: &str) -> (Value, String) {
-    let peer = Peer::of("../oracles/engine.py", scene);
-    let said = said(&mut command(task, &peer.port, &["--quiet"]));
-    let seen = peer.seen();
+    let (seen, failure) = run_with(task, scene, &[]);
     std::io::stdout().write_all(format!("{task} on {scene}: {seen}\n").as_bytes()).unwrap();
+    (seen, failure)
+}
+
+/// Runs a task with more arguments on a scene. Returns the same.
+pub(crate) fn run_with(task: &str, scene: &str, more: &[&str]) -> (Value, String) {
+    let peer = Peer::of("../oracles/engine.py", scene);
+    let said = said(&mut command(task, &peer.port, &[&["--quiet"], more].concat()));
+    let seen = peer.seen();
     (seen, if said.code == 0 { String::new() } else { said.err })
 }
 

@@ -30,6 +30,7 @@ mod doctor;
 mod doctor_press;
 mod draw;
 mod engine;
+mod engine_scenes;
 mod erased;
 mod errors;
 mod examples;

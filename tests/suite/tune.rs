@@ -210,6 +210,27 @@ fn what_cannot_be_tuned_says_why() {
 }
 
 #[test]
+fn a_mount_before_the_sum_changes_nothing_that_is_measured() {
+    // Half a turn about x, and columns that are turned with it.
+    let mount = [
+        "nodes.mount.type=static_pose",
+        "nodes.mount.rpy=[3.14159265358979, 0, 0]",
+        "nodes.turned.type=adjoint",
+        "nodes.turned.in.pose=mount.pose",
+        "nodes.turned.in.twist=projector.twist",
+        "nodes.sum.in.touch=turned.twist",
+        "nodes.jacobian.columns.pressure=[0, 0, -1, 0, 0, 0]",
+        "nodes.jacobian.columns.orientation=[0, 0, 0, 0, 0, 1]",
+    ];
+    let mount: Vec<&str> = mount.into_iter().flat_map(|set| ["--set", set]).collect();
+    let plain = ["tune", "graphs/edge.toml", "--feature", "orientation"];
+    let [without, with] = [&[][..], &mount].map(|mount| say(&[&plain[..], mount].concat()));
+    assert_eq!((without.code, with.code), (0, 0), "{}{}", without.err, with.err);
+    assert!(without.out.contains("gain margin"), "{}", without.out);
+    assert_eq!(without.out, with.out);
+}
+
+#[test]
 fn gains_that_follow_the_measured_travel_are_named_and_not_tuned() {
     // Without the commanded travel, the factor says nothing of the loop.
     let folder = tempfile::tempdir().unwrap();
