@@ -25,7 +25,7 @@ pub fn integrate(integral: f64, growth: f64, bound: f64, others: f64, limit: f64
 }
 
 /// Returns zero for a subnormal number, as arithmetic with such numbers is slow.
-fn flush_subnormal(value: f64) -> f64 {
+pub(super) fn flush_subnormal(value: f64) -> f64 {
     if value.abs() < f64::MIN_POSITIVE { 0.0 } else { value }
 }
 

@@ -1,6 +1,6 @@
 //! The control law of one feature, and what it remembers.
 //!
-//! u = kp e + I + kd de/dt, with I the sum of ki e dt. Time is that between the stamps of a component's samples, so a
+//! u = kp e + I + kd de/dt, with I the sum of ki e dt; `brake_above` takes from kp e. Time is that between the stamps of a component's samples, so a
 //! gain means the same at 100 Hz and at 1 kHz, and one sample is never integrated twice; the paper sums without dt, so
 //! its KI is ki times the period and its KD is kd over the period. The integral is kept in units of the control, so a
 //! change of ki makes no jump; it runs only near the target (`within`), is bounded, and does not grow outwards while
@@ -10,6 +10,7 @@ use tactflow_runtime::node::{Absence, Interval};
 use tactflow_runtime::signal::Unit;
 
 use super::Gains;
+use super::braked::{braked, smoothed};
 use crate::motion::axis::wrap_axial;
 use crate::servo::integral::integrate;
 
@@ -26,6 +27,8 @@ pub(super) struct Memory {
     error: f64,
     /// The last control, in the feature's unit per second.
     control: f64,
+    /// Smooth rate of the error, in the feature's unit per second; zero without a brake.
+    rate: f64,
     pub(super) interval: Interval,
     pub(super) absence: Absence,
 }
@@ -39,6 +42,7 @@ pub(super) struct Law {
     bound: f64,
     limit: f64,
     rise: Option<f64>,
+    brake_above: Option<f64>,
     is_axial: bool,
     /// Whether anything reads its control; otherwise it is frozen.
     pub(super) is_wanted: bool,
@@ -48,7 +52,9 @@ impl Law {
     pub(super) fn new(gains: &Gains, unit: Unit) -> Self {
         let Gains { kp, ki, kd, bound, rise, .. } = *gains;
         let [within, limit] = [gains.within, gains.limit].map(|bound| bound.unwrap_or(f64::INFINITY));
-        Self { kp, ki, kd, within, bound, limit, rise, is_axial: unit.is_axial(), is_wanted: true }
+        // A feature without a gain rests, also while it slides.
+        let brake_above = gains.brake_above.filter(|_| kp > 0.0);
+        Self { kp, ki, kd, within, bound, limit, rise, brake_above, is_axial: unit.is_axial(), is_wanted: true }
     }
 
     /// Returns the control for an error that comes `dt` [s] after the last one. Without a time there is no slope, and
@@ -58,7 +64,7 @@ impl Law {
         let change = if self.is_axial { wrap_axial(change) } else { change };
         let dt = dt.unwrap_or(0.0);
         let slope = if dt > 0.0 { change / dt } else { 0.0 };
-        let others = self.kp * error + self.kd * slope;
+        let others = self.proportional(error, slope, dt, memory) + self.kd * slope;
         let growth = if error.abs() <= self.within { self.ki * error * dt } else { 0.0 };
         // How far the control may be from zero, on the side of the last one and on the other side.
         let grown = |time: f64| self.rise.map_or(f64::INFINITY, |rise| rise * time);
@@ -70,5 +76,16 @@ impl Law {
         let (low, high) = if memory.control < 0.0 { (-most, other) } else { (-other, most) };
         memory.control = (others + memory.integral).clamp(low, high);
         memory.control
+    }
+
+    /// Returns the proportional part of the control, braked where the contact slides faster than it asks for.
+    fn proportional(&self, error: f64, slope: f64, dt: f64, memory: &mut Memory) -> f64 {
+        let control = self.kp * error;
+        let Some(above) = self.brake_above else {
+            memory.rate = 0.0;
+            return control;
+        };
+        memory.rate = smoothed(memory.rate, slope, dt);
+        braked(control, memory.rate, above)
     }
 }

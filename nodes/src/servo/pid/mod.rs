@@ -3,6 +3,7 @@
 //! A held component stays as it is. An absent one contributes nothing and resets only itself, and only when it has been
 //! away for long: a frame of flicker does not wipe an integral.
 
+mod braked;
 mod law;
 
 use tactflow_runtime::node::{
@@ -28,6 +29,12 @@ use law::{Law, Memory};
 /// An error e is reduced later than without it, by at most about kp e / (2 `rise`). Errors of less than `rise` · 20 ms / kp
 /// are answered at once, and so is noise of that size. A `gain_schedule` behind this node multiplies the `rise` too.
 ///
+/// `brake_above` is for dry friction along the pad. It holds a contact until the arm is bent far enough. Then the contact
+/// slides faster than kp e, and a soft arm can carry it beyond the setpoint. The speed of the contact is the rate of the
+/// error, behind a low-pass filter of 30 ms. Where it is larger than kp e by more than `brake_above`, a fifth of what it is
+/// larger by reduces the control. If the contact slides away from the setpoint, its whole speed counts. The rate begins at
+/// zero. A step of the setpoint is a rate too: it gives a push of at most a fifth of the step.
+///
 /// A repeated sample is neither integrated nor differentiated, and neither is the first one after a gap longer than the
 /// graph's `max_gap_ms`. A feature that is absent contributes nothing; its integral and its control survive flicker and
 /// are reset when the feature is absent for the graph's `reset_after_ms`. kd amplifies noise: smooth the feature first,
@@ -40,8 +47,8 @@ use law::{Law, Memory};
 /// [nodes.pid]
 /// type = "pid"
 /// in.error = "error.error"
-/// gains.x = { kp = 2.0, rise = 0.2 }  # [1/s, m/s2]
-/// gains.y = { kp = 2.0 }
+/// gains.x = { kp = 2.0, rise = 0.2 }          # [1/s, m/s2]
+/// gains.y = { kp = 2.0, brake_above = 0.01 }  # [1/s, m/s]
 /// gains.pressure = { kp = 0.2, ki = 0.06, within = 0.02 }   # integrates only near the target
 /// ```
 #[derive(Describe)]
@@ -89,6 +96,9 @@ struct Gains {
     /// Bound on how fast the control grows away from zero; without it, it grows at once.
     #[param(unit = "E/s2", above = 0.0)]
     rise: Option<f64>,
+    /// By how much a contact may slide faster than kp e before it is braked; without it, it is never braked.
+    #[param(unit = "E/s", above = 0.0)]
+    brake_above: Option<f64>,
 }
 
 impl Gains {

@@ -354,6 +354,37 @@ fn a_component_is_on_its_own() {
 }
 
 #[test]
+fn what_slides_faster_than_asked_for_is_braked() {
+    let mut rig = one(Unit::METRE, "kp = 4.0, brake_above = 0.01");
+    assert_near(feed(&mut rig, 0.002, 4.0), 0.008, "it has yet to move");
+    let last = (1..=300).map(|k| feed(&mut rig, 0.002 - 0.03 * 0.004 * f64::from(k), 4.0)).last().unwrap();
+    assert_near(last, -0.136 - 0.2 * 0.02, "it slides away from the setpoint");
+    assert_near(feed(&mut rig, -0.034, 2000.0), -0.136 - 0.2 * (0.03 * (-4.0_f64 / 30.0).exp() - 0.01), "it stops");
+    let held = feed(&mut rig, -0.034, 4.0);
+    assert!((held + 0.136).abs() < 0.006 + 1e-9, "a gap tells no rate: {held}");
+}
+
+#[test]
+fn an_angle_that_turns_on_beyond_its_range_is_no_jump() {
+    let mut rig = one(Unit::AXIAL, "kp = 1.0, brake_above = 0.01");
+    let at = |k: u32| (1.5 + 0.002 * f64::from(k) + PI / 2.0).rem_euclid(PI) - PI / 2.0;
+    let controls: Vec<f64> = (0..200).map(|k| feed(&mut rig, at(k), 4.0) - at(k)).collect();
+    assert!(controls.iter().all(|brake| (0.0..=0.2 * 0.5 + 1e-9).contains(brake)), "0.5 rad/s: {controls:?}");
+}
+
+#[test]
+fn a_brake_keeps_the_other_bounds_and_needs_a_gain() {
+    let slides = |gains: &str| {
+        let mut rig = one(Unit::METRE, gains);
+        (0..=300).map(|k| feed(&mut rig, -0.001 * f64::from(k), 4.0)).last().unwrap()
+    };
+    assert_near(slides("kp = 4.0, brake_above = 0.01"), -1.2 - 0.2 * 0.24, "0.25 m/s");
+    assert_eq!(slides("kp = 4.0, brake_above = 0.01, limit = 0.3"), -0.3);
+    assert_eq!(slides("brake_above = 0.01"), 0.0, "no gain, no motion");
+    assert_near(slides("kp = -4.0, brake_above = 0.01"), 1.2, "a negative gain has no brake, which would push");
+}
+
+#[test]
 fn what_is_subnormal_becomes_zero() {
     let mut rig = one(Unit::METRE, "ki = 1.0");
     assert_eq!([1e-306, 1e-306].map(|error| feed(&mut rig, error, 4.0)), [0.0; 2]);
@@ -391,6 +422,7 @@ fn gains_and_features_must_agree() {
         "bound = 0",
         "limit = 0.0",
         "rise = 0.0",
+        "brake_above = 0.0",
     ];
     for bad in bad {
         let params = format!("gains = {{ x = {{ {bad} }}, y = {{}} }}");

@@ -37,6 +37,9 @@ pub(crate) struct Feature {
     /// By how much its control may grow in a second [unit of the feature per s²].
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(crate) rise: Option<f64>,
+    /// Speed beyond that of its control from which on it is braked [unit of the feature per s].
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(crate) brake_above: Option<f64>,
     /// Largest control [unit of the feature per s].
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(crate) limit: Option<f64>,
@@ -289,7 +292,7 @@ pub(super) fn feature<'a>(nodes: &Nodes<'a>, jacobian: &'a OutlinedBlock, name: 
     let (filters, gates) = way.map(|way| (way.filters, way.gates)).unwrap_or_default();
     let (sides, turn, way_of_column) = (Vec::new(), None, Matrix6::zeros());
     let [kp, ki, kd] = ["kp", "ki", "kd"].map(|which| number(which).unwrap_or(0.0));
-    let [rise, limit, within] = ["rise", "limit", "within"].map(number);
+    let [rise, brake_above, limit, within] = ["rise", "brake_above", "limit", "within"].map(number);
     let compared = error.map(|error| error.name.clone());
     let pid = pid.map(|pid| pid.name.clone());
     let schedules = scheduled.into_iter().filter_map(|node| Schedule::of(nodes, node, &name, measured.as_deref()));
@@ -301,6 +304,7 @@ pub(super) fn feature<'a>(nodes: &Nodes<'a>, jacobian: &'a OutlinedBlock, name: 
         ki,
         kd,
         rise,
+        brake_above,
         limit,
         within,
         measured,

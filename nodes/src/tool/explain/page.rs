@@ -81,6 +81,7 @@ fn law(mode: &ModeSummary, style: &Style) -> String {
     let moving = || law.features.iter().filter(|one| one.moves());
     text += &moving().flat_map(|one| one.schedules.iter().map(|schedule| scheduled(one, schedule))).collect::<String>();
     text += &moving().filter_map(rising).collect::<String>();
+    text += &moving().filter_map(braked).collect::<String>();
     text += &moving().filter_map(bounded).collect::<String>();
     text += &moving().filter_map(|feature| together(feature, &mode.loops)).collect::<String>();
     let off: Vec<String> =
@@ -130,6 +131,16 @@ fn rising(feature: &Feature) -> Option<String> {
     Some(format!(
         "`{pid}` lets the control of `{name}` grow by at most {rise} {unit}: a large error is reduced later than by kp \
          alone.\n"
+    ))
+}
+
+/// Says which motion of a feature is braked.
+fn braked(feature: &Feature) -> Option<String> {
+    let (pid, name, above) = (feature.pid.as_ref()?, &feature.name, number(feature.brake_above?));
+    let unit = feature.unit().map_or_else(|| format!("per s, in the unit of `{name}`"), |unit| format!("{unit}/s"));
+    Some(format!(
+        "`{pid}` brakes `{name}` where it moves faster than kp asks for, by more than {above} {unit}. The margins leave \
+         this out.\n"
     ))
 }
 

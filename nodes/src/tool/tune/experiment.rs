@@ -6,7 +6,7 @@ use tactflow_runtime::engine::{End, Engine, RunOptions, run};
 use tactflow_runtime::graph::{Outline, OutlinedMode, Request, compile};
 use tactflow_runtime::record::PortColumns;
 
-use super::gain_keys::gains;
+use super::gain_keys::{gain_key, gains};
 use super::lift;
 use super::limited::{Limited, Watch};
 use super::load::{Loads, Room};
@@ -169,6 +169,9 @@ impl Experiment<'_> {
         }
         let Feature { kp, ki, kd, column, .. } = *self.feature;
         set.extend(gains(self.feature, self.mode, [kp, ki, kd].map(|gain| gain * self.share)));
+        // What is measured is computed with the gains alone, so that nothing may brake.
+        let pid = self.feature.pid.iter().filter(|_| self.feature.brake_above.is_some());
+        set.extend(pid.map(|pid| format!("{}=1e9", gain_key(pid, &self.feature.name, "brake_above", self.mode))));
         // Otherwise the gains would change while they are measured.
         let schedule = self.feature.schedules.iter();
         set.extend(schedule.flat_map(|one| ["min", "max"].map(|key| format!("nodes.{}.{key}=1.0", one.node))));
