@@ -123,6 +123,7 @@ fn every_shipped_task_is_explained_for_a_person_and_for_a_page() {
         "in the mode `servo`",
         "-3.3",
         "`pid` lets the control of `x` grow by at most 0.25 m/s2",
+        "`pid` brakes `y` where it moves faster than kp asks for, by more than 0.01 m/s.",
         "`pid` integrates errors of `pressure` up to 0.02 only",
         "At rest: wx, wy, wz.",
         "From a change of the contact to the command: 2 ms for `x`, `y`; 70 ms for `pressure`.",

@@ -31,7 +31,7 @@ fn a_run_has_its_summary_its_curves_its_graph_and_its_modes() {
     };
     let own = curves(&own);
     assert!(own.len() >= 3 && own.iter().all(|curve| page.contains(curve.as_str())), "{} curves", own.len());
-    for text in [">sensor_pose: pose in pad in arm.base<", ">touch.present is lost for 100 ms<", "servo     1.112 s"] {
+    for text in [">sensor_pose: pose in pad in arm.base<", ">touch.present is lost for 100 ms<", "servo     1.116 s"] {
         assert!(page.contains(text), "{text}");
     }
 }

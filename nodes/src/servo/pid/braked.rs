@@ -4,7 +4,7 @@ use crate::servo::integral::flush_subnormal;
 
 /// Time constant of the low-pass filter of the error's rate [s].
 const SMOOTH_S: f64 = 0.03;
-/// Part of the speed by which a contact slides too fast that brakes it. With 0.3, a loop with 60 ms of delay can hunt [1].
+/// Part of the excess of speed that brakes the contact. With 0.3, a loop with 60 ms of delay can hunt [1].
 const PART: f64 = 0.2;
 
 /// Returns the smooth rate of an error after its next slope, `dt` after the last one [s].

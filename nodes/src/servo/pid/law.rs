@@ -1,6 +1,7 @@
 //! The control law of one feature, and what it remembers.
 //!
-//! u = kp e + I + kd de/dt, with I the sum of ki e dt; `brake_above` takes from kp e. Time is that between the stamps of a component's samples, so a
+//! u = kp e + I + kd de/dt, with I the sum of ki e dt. A contact that slides too fast is braked: see `braked`. Time is
+//! that between the stamps of a component's samples, so a
 //! gain means the same at 100 Hz and at 1 kHz, and one sample is never integrated twice; the paper sums without dt, so
 //! its KI is ki times the period and its KD is kd over the period. The integral is kept in units of the control, so a
 //! change of ki makes no jump; it runs only near the target (`within`), is bounded, and does not grow outwards while
@@ -85,7 +86,7 @@ impl Law {
             memory.rate = 0.0;
             return control;
         };
-        memory.rate = smoothed(memory.rate, slope, dt);
+        memory.rate = if dt > 0.0 { smoothed(memory.rate, slope, dt) } else { 0.0 };
         braked(control, memory.rate, above)
     }
 }
