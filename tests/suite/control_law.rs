@@ -50,23 +50,48 @@ fn grown(feature: &Value, wanted: f64, last: &BTreeMap<String, f64>, row: &BTree
     wanted.clamp((control.min(0.0) - step).min(-least), (control.max(0.0) + step).max(least))
 }
 
+/// The rate of an error behind its low-pass filter of 30 ms, which begins at zero with the first control.
+fn smooth_rate(rate: f64, name: &str, last: &BTreeMap<String, f64>, row: &BTreeMap<String, f64>) -> f64 {
+    let error = format!("error.error.{name}");
+    if !last.contains_key(&format!("pid.control.{name}")) {
+        return 0.0;
+    }
+    let step = row["time"] - last["time"];
+    let slope = (row[&error] - last[&error]) / step;
+    rate + (slope - rate) * (1.0 - (-step / 0.03).exp())
+}
+
+/// A control, less a fifth of what its contact slides faster than it by, beyond `brake_above`.
+fn braked(feature: &Value, wanted: f64, rate: f64) -> f64 {
+    let Some(above) = feature["brake_above"].as_f64() else { return wanted };
+    let faster = if -rate * wanted > 0.0 { (rate.abs() - wanted.abs()).max(0.0) } else { rate.abs() };
+    wanted + 0.2 * (faster - above).max(0.0).copysign(rate)
+}
+
 /// Asserts that the twist of each tick is the sum of the columns times the controls and of the constants, and that a
-/// control without integral, derivative and `brake_above` is kp times its error.
+/// control without integral and derivative is kp times its error, less what brakes it.
 fn assert_is_the_law_of_a_run(graph: &str, sum: &str, for_s: &str) {
     let explained = explained(&[graph]);
     let modes = explained["motions"][0]["modes"].as_array().unwrap();
-    let (mut compared, rows) = (0, recorded(&[graph], for_s));
+    let (mut compared, mut rates, rows) = (0, BTreeMap::new(), recorded(&[graph], for_s));
     // A tick in which the mode changes writes the twist of the one before.
-    for [last, row] in rows.array_windows().filter(|[last, row]| last["mode"] == row["mode"]) {
+    for [last, row] in rows.array_windows() {
+        for name in row.keys().filter_map(|port| port.strip_prefix("pid.control.")) {
+            let rate = rates.entry(name).or_insert(0.0);
+            *rate = smooth_rate(*rate, name, last, row);
+        }
+        if last["mode"] != row["mode"] {
+            continue;
+        }
         let mode = &modes[row["mode"] as usize];
         let mut twist = [0.0; 6];
         for feature in mode["features"].as_array().unwrap() {
             let name = feature["name"].as_str().unwrap();
             let Some(control) = row.get(&format!("pid.control.{name}")) else { continue };
-            let is_proportional =
-                ["ki", "kd"].iter().all(|gain| feature[gain] == 0.0) && feature["brake_above"].is_null();
+            let is_proportional = ["ki", "kd"].iter().all(|gain| feature[gain] == 0.0);
             if let Some(error) = row.get(&format!("error.error.{name}")).filter(|_| is_proportional) {
-                let by_hand = grown(feature, feature["kp"].as_f64().unwrap() * error, last, row);
+                let wanted = feature["kp"].as_f64().unwrap() * error;
+                let by_hand = grown(feature, braked(feature, wanted, rates[name]), last, row);
                 assert!((control - by_hand).abs() < 1e-9, "{graph}, {name}: {control} and {by_hand}");
             }
             let schedules = feature["schedules"].as_array().into_iter().flatten();

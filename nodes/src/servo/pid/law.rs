@@ -1,11 +1,11 @@
 //! The control law of one feature, and what it remembers.
 //!
 //! u = kp e + I + kd de/dt, with I the sum of ki e dt. A contact that slides too fast is braked: see `braked`. Time is
-//! that between the stamps of a component's samples, so a
-//! gain means the same at 100 Hz and at 1 kHz, and one sample is never integrated twice; the paper sums without dt, so
-//! its KI is ki times the period and its KD is kd over the period. The integral is kept in units of the control, so a
-//! change of ki makes no jump; it runs only near the target (`within`), is bounded, and does not grow outwards while
-//! the output is at its limit or grows as fast as it may. The error of a line's direction is differenced modulo pi.
+//! that between the stamps of a component's samples, so a gain means the same at 100 Hz and at 1 kHz, and one sample is
+//! never integrated twice; the paper sums without dt, so its KI is ki times the period and its KD is kd over the period.
+//! The integral is kept in units of the control, so a change of ki makes no jump; it runs only near the target
+//! (`within`), is bounded, and does not grow outwards while the output is at its limit or grows as fast as it may. The
+//! error of a line's direction is differenced modulo pi.
 
 use tactflow_runtime::node::{Absence, Interval};
 use tactflow_runtime::signal::Unit;

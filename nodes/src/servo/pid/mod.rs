@@ -31,9 +31,9 @@ use law::{Law, Memory};
 ///
 /// `brake_above` is for dry friction along the pad. It holds a contact until the arm is bent far enough. Then the contact
 /// slides faster than kp e, and a soft arm can carry it beyond the setpoint. The speed of the contact is the rate of the
-/// error, behind a low-pass filter of 30 ms. Where it is larger than kp e by more than `brake_above`, a fifth of what it is
-/// larger by reduces the control. If the contact slides away from the setpoint, its whole speed counts. The rate begins at
-/// zero, also after a gap. A step of the setpoint is a rate too: it gives a push of at most a fifth of the step.
+/// error, behind a low-pass filter of 30 ms. Where it exceeds kp e by more than `brake_above`, a fifth of what is beyond
+/// that is subtracted from the control. If the contact slides away from the setpoint, its whole speed counts. The rate
+/// begins at zero, also after a gap. A step of the setpoint is a rate too: it gives a push of at most a fifth of the step.
 ///
 /// A repeated sample is neither integrated nor differentiated, and neither is the first one after a gap longer than the
 /// graph's `max_gap_ms`. A feature that is absent contributes nothing; its integral and its control survive flicker and

@@ -360,7 +360,7 @@ fn what_slides_faster_than_asked_for_is_braked() {
     let last = (1..=300).map(|k| feed(&mut rig, 0.002 - 0.03 * 0.004 * f64::from(k), 4.0)).last().unwrap();
     assert_near(last, -0.136 - 0.2 * 0.02, "it slides away from the setpoint");
     assert_near(feed(&mut rig, -0.034, 2000.0), -0.136 - 0.2 * (0.03 * (-4.0_f64 / 30.0).exp() - 0.01), "it stops");
-    assert_eq!(feed(&mut rig, -0.034, 4.0), -0.136, "a gap tells no rate");
+    assert_eq!(feed(&mut rig, -0.034, 4.0), -0.136, "after a gap, the rate begins at zero");
 }
 
 #[test]

@@ -169,7 +169,7 @@ impl Experiment<'_> {
         }
         let Feature { kp, ki, kd, column, .. } = *self.feature;
         set.extend(gains(self.feature, self.mode, [kp, ki, kd].map(|gain| gain * self.share)));
-        // What is measured is computed with the gains alone, so that nothing may brake.
+        // A response is computed from the gains alone, so the brake must not act: no contact is as fast as this.
         let pid = self.feature.pid.iter().filter(|_| self.feature.brake_above.is_some());
         set.extend(pid.map(|pid| format!("{}=1e9", gain_key(pid, &self.feature.name, "brake_above", self.mode))));
         // Otherwise the gains would change while they are measured.
