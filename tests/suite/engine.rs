@@ -142,6 +142,7 @@ const EVENTS: [Event; 18] = [
         holds: &[
             ("/lost", 0.0),
             ("/after/most", 5.0),
+            ("/after/response/pressure", 0.1),
             ("/after/response/x", 0.1),
             ("/after/response/y", 0.1),
             ("/true_error/0", 0.1),

@@ -8,20 +8,26 @@ use tactflow_runtime::node::{At, Mistake, State};
 use tactflow_runtime::source::Code;
 
 use super::rest::{Rest, Verdict};
+use super::sums::Sums;
 use super::{Inputs, InputsShapes, Params};
 
 /// Number of frames in a row with one image from which on a pad with noise counts as blind: its image is absent.
 const BLIND: u32 = 3;
 /// Number of frames in a row with one image from which on it is stuck: the task ends.
 const STUCK: u32 = 25;
+/// Without a `max_rise`: a jump by that many times the range of the sums so far is garbage [1].
+const LEAP: f64 = 8.0;
+/// The range of the sums from which on it counts, as a multiple of the noise of the sum: that of a contact. Noise alone has
+/// a range of five times its deviation, and a first touch must not be garbage [1].
+const FELT: f64 = 20.0;
 
 /// Which frames are dropped.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct FrameRules {
     /// Largest reading [unit of the input].
     max_reading: f64,
-    /// Largest change of the sum from frame to frame [unit of the input].
-    max_rise: f64,
+    /// Largest change of the sum from frame to frame [unit of the input]; `None` if it is learned.
+    max_rise: Option<f64>,
 }
 
 /// What was seen of the frames so far.
@@ -31,6 +37,8 @@ pub(super) struct Frames {
     last: Option<[f64; 2]>,
     /// Number of frames in a row with them.
     repeats: u32,
+    /// The sums after the self-test.
+    sums: Sums,
     /// Whether the frame before was dropped because of its sum.
     was_odd: bool,
     /// Number of frames that were dropped.
@@ -58,9 +66,9 @@ impl FrameRules {
     /// Returns the rules, or `None` if no sum and no peak is wired.
     pub(super) fn new(params: &Params, inputs: &InputsShapes) -> Result<Option<Self>, Mistake> {
         let given = [("max_reading", params.max_reading), ("max_rise", params.max_rise)];
-        let [max_reading, max_rise] = given.map(|(_, value)| value.unwrap_or(f64::INFINITY));
         if inputs.sum.is_some() && inputs.peak.is_some() {
-            return Ok(Some(Self { max_reading, max_rise }));
+            let max_reading = params.max_reading.unwrap_or(f64::INFINITY);
+            return Ok(Some(Self { max_reading, max_rise: params.max_rise }));
         }
         let unfit = given.into_iter().find(|(_, value)| value.is_some());
         unfit.map_or(Ok(None), |(name, _)| {
@@ -76,20 +84,31 @@ impl FrameRules {
     pub(super) fn judge(self, inputs: &Inputs<'_>, rest: &Rest, frames: &mut Frames) -> Frame {
         let (Some(sum), Some(peak)) = (&inputs.sum, &inputs.peak) else { return Frame::Good };
         let now = [**sum, **peak];
-        let jumps = frames.last.is_some_and(|[last, _]| (now[0] - last).abs() > self.max_rise);
+        let most = self.max_rise.unwrap_or_else(|| learned(inputs, rest, frames));
+        let jumps = frames.last.is_some_and(|[last, _]| (now[0] - last).abs() > most);
         let is_odd = jumps && !frames.was_odd;
         if is_odd || now[1] > self.max_reading {
             (frames.was_odd, frames.dropped) = (is_odd, frames.dropped + 1);
             return Frame::Blind;
         }
         frames.repeats = if frames.last == Some(now) { frames.repeats + 1 } else { 1 };
-        (frames.last, frames.was_odd) = (Some(now), false);
+        let last = frames.last.replace(now).filter(|_| rest.verdict == Verdict::Passed);
+        last.iter().for_each(|last| frames.sums.add(last[0], now[0]));
+        frames.was_odd = false;
         match frames.repeats {
             STUCK.. if rest.has_noise && rest.verdict == Verdict::Passed => Frame::Stuck,
             BLIND.. if rest.has_noise => Frame::Blind,
             _ => Frame::Good,
         }
     }
+}
+
+/// Returns the largest change of the sum that the contact so far explains. Without noise, or before a contact, nothing is
+/// known.
+fn learned(inputs: &Inputs<'_>, rest: &Rest, frames: &Frames) -> f64 {
+    let tactels = inputs.image.as_ref().map_or(0, |image| image.cells().len());
+    let (range, noise) = (frames.sums.range(), rest.noise * (tactels as f64).sqrt());
+    if noise > 0.0 && range >= FELT * noise { LEAP * range } else { f64::INFINITY }
 }
 
 #[cfg(test)]
@@ -176,6 +195,68 @@ mod tests {
         assert!((0..100).all(|_| show(&mut rig, [100.0; 4])));
         let mut untested = make("", true).unwrap();
         assert!((0..100).all(|_| show(&mut untested, [100.0; 4])));
+    }
+
+    /// A pad without bounds after its self-test, pressed by 80: its sums have been 401 to 480.
+    fn pressed() -> NodeRig {
+        let mut rig = make("rest_frames = 8", true).unwrap();
+        (0..8).for_each(|i| _ = show(&mut rig, REST[i % 2]));
+        assert!(show(&mut rig, REST[0]) && show(&mut rig, [120.0; 4]) && show(&mut rig, [120.0, 121.0, 120.0, 120.0]));
+        rig
+    }
+
+    /// Four readings with this sum.
+    fn cells(sum: f32) -> [f32; 4] {
+        [sum / 4.0; 4]
+    }
+
+    #[test]
+    fn without_a_bound_a_jump_by_eight_times_the_range_of_a_contact_is_garbage() {
+        let mut rig = pressed();
+        assert!(show(&mut rig, cells(481.0 + 632.0)) && show(&mut rig, cells(481.0)), "eight times 79");
+        assert!(!show(&mut rig, cells(481.0 + 641.0)) && show(&mut rig, cells(481.0)), "more than eight times 80");
+        assert!(!show(&mut rig, cells(-200.0)) && show(&mut rig, cells(480.0)), "downwards");
+        assert!(!show(&mut rig, cells(2000.0)) && show(&mut rig, cells(2001.0)), "a blow costs one frame");
+        assert!(rig.found().unwrap().ends_with("; 3 frames dropped as garbage"), "{:?}", rig.found());
+    }
+
+    #[test]
+    fn without_a_bound_a_first_touch_is_no_garbage() {
+        let mut rig = make("rest_frames = 8", true).unwrap();
+        (0..8).for_each(|i| _ = show(&mut rig, REST[i % 2]));
+        assert!(show(&mut rig, cells(4000.0)) && show(&mut rig, cells(8000.0)) && show(&mut rig, cells(30_000.0)));
+    }
+
+    #[test]
+    fn garbage_does_not_change_the_bound_that_is_learned() {
+        let mut rig = pressed();
+        for sum in [480.0, 481.0, 480.0] {
+            assert!(!show(&mut rig, cells(4000.0)) && show(&mut rig, cells(sum)), "single frames");
+        }
+        for _ in 0..2 {
+            let pair = [4000.0, 4000.0, 481.0, 480.0].map(|sum| show(&mut rig, cells(sum)));
+            assert_eq!(pair, [false, true, false, true], "the second one counts, and so the one after it jumps");
+        }
+        assert!(!show(&mut rig, cells(1200.0)) && show(&mut rig, cells(480.0)));
+    }
+
+    #[test]
+    fn garbage_in_the_self_test_does_not_change_the_bound_that_is_learned() {
+        let mut rig = make("rest_frames = 8", true).unwrap();
+        for i in 0..8 {
+            show(&mut rig, if i % 4 == 1 { cells(16_000.0) } else { REST[i % 2] });
+        }
+        for cells in [REST[0], cells(480.0), cells(481.0)] {
+            assert!(show(&mut rig, cells));
+        }
+        assert!(!show(&mut rig, cells(4000.0)) && show(&mut rig, cells(480.0)));
+    }
+
+    #[test]
+    fn a_pad_without_noise_learns_no_bound() {
+        let mut rig = make("rest_frames = 8", true).unwrap();
+        (0..8).for_each(|_| _ = show(&mut rig, [100.0; 4]));
+        assert!([480.0, 481.0, 4000.0, 480.0].into_iter().all(|sum| show(&mut rig, cells(sum))));
     }
 
     #[test]

@@ -8,6 +8,7 @@ mod frames;
 mod repair;
 mod rest;
 mod sinking;
+mod sums;
 mod tactel_curves;
 mod tare;
 
@@ -45,9 +46,11 @@ use super::common::halves::FREE;
 /// Dead tactels add up.
 ///
 /// **Frames.** With `in.sum` and `in.peak`, wired to the `tactile_source` of the image, frames that are no measurement
-/// are dropped before any mean, and both images are absent for that time: nothing moves into the object. A frame with a
-/// reading above `max_reading` is dropped, and one whose sum changes by more than `max_rise`. The frame after that one
-/// counts, so that an impact costs one frame. A pad whose self-test saw noise never sends one image three times in a
+/// are dropped before any mean, and both images are absent for that time: the motion stops. A frame with a reading above
+/// `max_reading` is dropped, and one whose sum changes by more than `max_rise`. The frame after that one counts, so that
+/// an impact costs one frame. Without a `max_rise` it is learned after the self-test, during a contact: eight times the
+/// range of the sums that two frames in a row have reached. Before a contact, or without noise, it is not known, and no
+/// frame is dropped because of its sum. A pad whose self-test saw noise never sends one image three times in a
 /// row: then the images are absent, and after 25 such frames the task ends with a fault. A pad that repeats its readings
 /// at rest may repeat them. A pad whose zero sinks hides a force: with a self-test and a `tare_bound`, the task ends with
 /// a fault if more than a quarter of the live readings are below their zeros by more than the bound, in three looks that
@@ -146,7 +149,7 @@ pub struct Params {
     #[param(unit = "U")]
     max_reading: Option<f64>,
     /// Largest possible change of the sum from frame to frame; a frame that changes by more is dropped, and the next one
-    /// counts.
+    /// counts. Without it, eight times the range of the sums so far, once they are those of a contact.
     #[param(unit = "U", above = 0.0)]
     max_rise: Option<f64>,
 }
@@ -264,7 +267,11 @@ impl Node for Calibrate {
 
     fn found(&self, state: &State) -> Option<String> {
         let test = self.test.as_ref().map(|test| findings::describe(test, &self.unit.to_string(), &state.rest));
-        let dropped = (state.frames.dropped > 0).then(|| format!("{} frames dropped as garbage", state.frames.dropped));
+        let dropped = match state.frames.dropped {
+            0 => None,
+            1 => Some("1 frame dropped as garbage".to_owned()),
+            more => Some(format!("{more} frames dropped as garbage")),
+        };
         test.into_iter().chain(dropped).reduce(|test, dropped| format!("{test}; {dropped}"))
     }
 
