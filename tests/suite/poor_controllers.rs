@@ -228,6 +228,37 @@ fn an_exit_that_waits_for_another_error_does_not_need_this_one() {
 }
 
 #[test]
+fn the_help_of_a_held_place_leaves_the_control_of_the_force() {
+    for (task, change, fix) in [
+        ("square", "in_plane = false", "write `in_plane = true` in `path`"),
+        ("guided", "speed_rad_per_s = 0.1\nspeed_m_per_s = 0.02", "write `speed_m_per_s = 0.0` in `level`"),
+    ] {
+        let help = help(task, &[change]);
+        assert!(help.starts_with(fix), "{help}");
+    }
+}
+
+#[test]
+fn a_gain_that_is_too_large_for_its_rise_is_to_become_smaller() {
+    let text = help("hybrid", &["gains.x = { kp = 12.0, rise = 0.1 }", "set facts.arm.contacts=[]"]);
+    assert!(text.starts_with("write `kp = 3.1` or less for this `rise`, or `rise = 1.44` or more"), "{text}");
+    let text = help("hybrid", &["gains.x = { kp = 3.0, rise = 0.005 }"]);
+    assert!(text.starts_with("write `rise = 0.09` or more, or remove it"), "{text}");
+}
+
+#[test]
+fn a_range_that_leaves_a_small_margin_says_which() {
+    let text = |most: f64| {
+        let change = format!("set live.pid.gains.y.kp.max={most}");
+        variant("hybrid", &[&change]).warnings().map(|report| report.render(false)).unwrap()
+    };
+    let small = text(11.0);
+    assert!(small.contains("the gain margin of the loop of `y` is then only 1.9 dB over `ball`"), "{small}");
+    let none = text(20.0);
+    assert!(none.contains("the loop of `y` is then unstable over `ball`"), "{none}");
+}
+
+#[test]
 fn a_rule_that_is_broken_on_purpose_is_allowed_with_its_reason() {
     let changes =
         ["gains.x = { kp = 17.5 }", "+[allow]", "+low-margin = \"it rings on purpose, to show what ringing is\""];

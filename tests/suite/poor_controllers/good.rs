@@ -1,6 +1,6 @@
 //! Controllers as an integrator may write them.
 
-use super::variant::{Variant, cleared, compared, graph, search, variant, with_area, with_feature};
+use super::variant::{Variant, approaching, cleared, compared, graph, search, variant, with_area, with_feature};
 
 /// The lines of all gains of a task, with each `kp` and `ki` times a factor.
 fn scaled(task: &'static str, factor: f64) -> Vec<String> {
@@ -334,6 +334,14 @@ pub(super) fn good_by_modes() -> Vec<Variant> {
             changes: [&search("0.008")[..], &["set modes.search.set.reach.twist=[0.008, 0, 0, 0, 0, 0]".to_owned()]]
                 .concat(),
         },
+        // The time ends the approach after 48 mm, and inside of a clear box its way does not count.
+        approaching("after_ms = 6000, after_travel_mm = 150", &[]),
+        approaching(
+            "after_ms = 30000, after_travel_mm = 150",
+            &["set facts.arm.clear_min_m=[-0.8, -0.4, 0.3]", "set facts.arm.clear_max_m=[-0.3, 0.4, 0.7]"],
+        ),
+        // A pressure that is a fifth above the threshold of the pad.
+        variant("force", &["setpoint = { pressure = 0.018 }"]),
         // Rolling that couples the axes a little, and a press that slides a little.
         variant("rolling", &["columns.x = [-1, 0, 0, 5, -20, 0]"]),
         variant("hybrid", &["columns.pressure = [0.3, 0, 1, 0, 0, 0]"]),

@@ -23,6 +23,8 @@ pub(super) fn poor_by_others() -> Vec<(&'static str, Variant)> {
         ("unreachable-setpoint", pressure("{ min = 0.05, max = 5.0, rate = 0.1 }")),
         ("unreachable-setpoint", pressure("{ min = 0.005, max = 0.2, rate = 0.1 }")),
         ("unreachable-setpoint", pressure("{ min = 0.05, max = 2.95, rate = 0.1 }")),
+        // A place behind a schedule of the pressure, which is 1 over the ball.
+        ("low-margin", variant("hybrid", &["features = [\"pressure\", \"x\"]", "gains.x = { kp = 17.5 }"])),
         // The noise of the spare force, and spare forces that the limit does not let the sensor press.
         (
             "unfiltered-derivative",
@@ -44,6 +46,7 @@ pub(super) fn poor_by_others() -> Vec<(&'static str, Variant)> {
         ("wrong-column", variant("hold_without_slip", &["columns.spare = [0, 0, -0.004, 0, 0, 0]"])),
         // A pressure that is hardly above the threshold of the pad.
         ("unreachable-setpoint", variant("edge", &["set nodes.error.setpoint.pressure=0.0155"])),
+        ("unreachable-setpoint", variant("edge", &["set nodes.error.setpoint.pressure=0.017"])),
         // Nothing holds the angle of a pen that is longer than the pad.
         ("line-position", on("pen", variant("position", &["set devices.bench.objects.0.length=0.3"]))),
         // The guide rolls the sensor, and nothing presses.

@@ -1,6 +1,6 @@
 //! Controllers in which two things contradict each other: two flags, two setpoints, a setpoint and its limit.
 
-use super::variant::{Variant, variant, with_feature};
+use super::variant::{Variant, leaving, variant, with_feature};
 
 /// Features that two flags keep away, a place between two setpoints, and a force just below its limit.
 pub(super) fn poor_pairs() -> Vec<(&'static str, Variant)> {
@@ -68,12 +68,17 @@ pub(super) fn poor_pairs() -> Vec<(&'static str, Variant)> {
                 &["set nodes.error.setpoint.force=14.8", "set limits.force_n=15.0"],
             ),
         ),
+        // The factor of the schedule is known over the ball, and 1 where the bench states no contact.
+        ("opposed-motion", leaving(&[])),
+        ("opposed-motion", leaving(&["set facts.arm.contacts=[]"])),
     ]
 }
 
 /// Controllers that look alike, and are good.
 pub(super) fn good_pairs() -> Vec<Variant> {
     vec![
+        // Over steel, the schedule leaves 2.4 mm/s of the control.
+        leaving(&["set facts.arm.contacts=[{ object = \"steel\", pressure = { vz = 100.0 } }]"]),
         // A place that is controlled twice, toward the same setpoint.
         with_feature("hybrid", "beside", "touch.x", "[-1, 0, 0, 0, 0, 0]", &["gains.x = { kp = 2.0 }"]),
         // Two flags that are set at the same time once the force has been large.

@@ -1,6 +1,8 @@
 //! Controllers with one mistake, each with the code of its warning.
 
-use super::variant::{Variant, cleared, compared, gated, on, search, through, variant, with_area, with_feature};
+use super::variant::{
+    Variant, approaching, cleared, compared, gated, on, search, through, variant, with_area, with_feature,
+};
 
 /// Mistakes that nodes between the feature and the motion hide from a first look.
 pub(super) fn poor_behind_nodes() -> Vec<(&'static str, Variant)> {
@@ -170,6 +172,7 @@ pub(super) fn poor_gains() -> Vec<(&'static str, Variant)> {
         ),
         ("unusual-gain", on("pen", variant("force", &["gains.pressure = { kp = 0.5, limit = 0.0002 }"]))),
         ("unreachable-setpoint", variant("force", &["set limits.blind_mm=4.0"])),
+        ("unreachable-setpoint", approaching("after_ms = 30000, after_travel_mm = 150", &[])),
         ("unforced-rolling", variant("explore", &["set modes.scan.set.projector.select=[0, 0, 0, 0, 0, 1]"])),
         ("slow-filter", variant("edge", &["set nodes.direction.window=250"])),
         ("slow-filter", variant("cable", &["set nodes.direction.window=250"])),
@@ -331,6 +334,9 @@ pub(super) fn opposed() -> Vec<(&'static str, Variant)> {
         ),
         ("opposed-motion", variant("square", &["set modes.retreat.set.reach.twist=[0, 0, 0.015, 0, 0, 0]"])),
         ("opposed-motion", variant("square", &["set nodes.path.in_plane=false"])),
+        // The fix leaves the control of the force.
+        ("opposed-motion", variant("square", &["in_plane = false"])),
+        ("opposed-motion", variant("guided", &["speed_rad_per_s = 0.1\nspeed_m_per_s = 0.02"])),
         ("opposed-motion", variant("edge", &["set modes.servo.set.reach.twist=[0, 0, 0.02, 0, 0, 0]"])),
         // A motion that only a contact lets pass.
         (
@@ -423,6 +429,9 @@ pub(super) fn at_second_sight() -> Vec<(&'static str, Variant)> {
         ),
         // What an operator may set while the arm moves.
         ("low-margin", variant("hybrid", &["set live.pid.gains.y.kp.max=20.0"])),
+        ("low-margin", variant("hybrid", &["set live.pid.gains.y.kp.max=11.0"])),
+        // The bench states no response of a place, but the arm has springs in its joints.
+        ("low-margin", variant("explore", &["set nodes.pid.gains.x.kp=20.0"])),
         // Without a larger gain that keeps the margins.
         (
             "low-margin",

@@ -94,6 +94,23 @@ pub(super) fn cleared(speed: &str) -> Vec<String> {
     .into()
 }
 
+/// The task `force` with another end of its approach, which has a speed of 8 mm/s.
+pub(super) fn approaching(end: &str, more: &[&str]) -> Variant {
+    let fail = format!("set modes.approach.fail={{ {end}, of = \"move.sensor_pose\" }}");
+    variant("force", &[&[&*fail], more].concat())
+}
+
+/// The task `force` with a mode that retreats with 20 mm/s while the pressure is controlled, by up to 24 mm/s.
+pub(super) fn leaving(more: &[&str]) -> Variant {
+    let own = [
+        "set modes.servo.go={ to = \"leave\", after_ms = 8000 }",
+        "set modes.leave.set.reach.twist=[0, 0, -0.02, 0, 0, 0]",
+        "set modes.leave.done={ after_travel_mm = 20, of = \"move.sensor_pose\" }",
+        "set modes.leave.fail={ after_ms = 5000 }",
+    ];
+    variant("force", &[&own, more].concat())
+}
+
 /// A gate in front of a port that a task reads at an input.
 pub(super) fn gated(kind: &str, port: &str, input: &str, gate: &str) -> Vec<String> {
     [

@@ -69,6 +69,8 @@ pub struct Params {
 const MAX_STABLE_STEP: f64 = 2.0;
 /// A small error, in the unit of any feature: what a `rise` must answer as fast as kp says.
 const SMALL_ERROR: f64 = 0.001;
+/// Gain with which the recipe of docs/control.md begins [1/s].
+const USUAL_KP: f64 = 3.5;
 /// An error within the noise of each feature [E].
 const TINY_ERROR: f64 = 0.0001;
 
@@ -130,7 +132,12 @@ impl Gains {
                 "the control of `{name}` grows by {rise} {unit}/s in a second: it takes {time:.1} s to answer an error of \
                  {SMALL_ERROR} {unit}"
             );
-            let help = format!("write `rise = {:.2}` or more, or remove it", 10.0 * self.kp * self.kp * SMALL_ERROR);
+            let least = format!("`rise = {:.2}` or more, or remove it", 10.0 * self.kp * self.kp * SMALL_ERROR);
+            let most = libm::floor(10.0 * libm::sqrt(rise / (10.0 * SMALL_ERROR))) / 10.0;
+            let help = match self.kp > USUAL_KP && most > 0.0 {
+                true => format!("write `kp = {most:.1}` or less for this `rise`, or {least}: the arm then swings more"),
+                false => format!("write {least}"),
+            };
             return Some(warn(Code::UnusualGain, "rise", message)?.help(help));
         }
         if let Some(limit) = self.limit.filter(|limit| *limit < self.kp * TINY_ERROR) {

@@ -50,7 +50,7 @@ impl Loop {
         // The same control that moves the arm by several nodes.
         let column = std::array::from_fn(|i| feature.column[i] + copies.iter().map(|copy| copy.column[i]).sum::<f64>());
         let around = Self::new(&Feature { column, ..feature.clone() }, &answer, latency_ms * 1e-3);
-        let factors = feature.schedules.iter().map(|schedule| schedule.factor(&answer));
+        let factors = feature.schedules.iter().map(|schedule| schedule.factor(contact));
         let factor = factors.product::<Option<f64>>()?;
         let mut beside = Vec::new();
         for other in others {

@@ -112,7 +112,7 @@ fn law(mode: &ModeSummary, style: &Style) -> String {
 
 /// Says what multiplies the gains of a feature.
 fn scheduled(feature: &Feature, schedule: &Schedule) -> String {
-    let Schedule { node, min, max, nominal } = schedule;
+    let Schedule { node, min, max, nominal, .. } = schedule;
     let range = format!("from {} to {}", number(*min), number(*max));
     let by = match nominal {
         Some(nominal) => {

@@ -10,11 +10,14 @@ use super::gains::unfiltered;
 use super::mode_law::ModeLaw;
 use super::reach::{beside_window, unreachable_setpoint};
 use super::stability::{KEPT, is_known, over, unmeasured};
+use crate::tool::control::choose::Wanted;
 use crate::tool::control::digits::down_to_two_digits;
 use crate::tool::control::law::Feature;
 use crate::tool::control::margins::margins;
 use crate::tool::control::response::Loop;
 
+/// What a loop has to keep with the largest gain of a range.
+const LEFT: Wanted = Wanted { peak: f64::INFINITY, gain_db: 3.0, phase_deg: 0.0 };
 /// Number of gains that are tried, each 5 % smaller than the one before: down to a ten thousandth of the largest.
 const TRIED: usize = 180;
 
@@ -128,8 +131,8 @@ impl<'a> Changed<'a> {
         with(self.feature, self.key, gain)
     }
 
-    /// Returns the warning about a range that reaches up to a gain with which a loop is unstable, and the largest gain
-    /// that keeps the margins. A loop that is unstable as written has its own warning.
+    /// Returns the warning about a range that reaches up to a gain with which a loop is unstable or nearly so, and the
+    /// largest gain that keeps the margins. A loop that is so as written has its own warning.
     fn judge(&self, arm: &Arm<'_>, mode: &ModeLaw<'_>) -> Option<(f64, Diagnostic)> {
         let contacts = &*arm.contacts_or_geometry();
         if !is_known(mode, self.feature, contacts) {
@@ -138,20 +141,22 @@ impl<'a> Changed<'a> {
         let around = |gain: f64, contact| Loop::over(&self.with(gain), contact).filter(|around| !around.is_reversed());
         let is = |holds: &dyn Fn(&Loop) -> bool, gain, contact| around(gain, contact).is_none_or(|one| holds(&one));
         let is_stable = |around: &Loop| margins(around).is_stable;
-        let shaken = contacts.iter().find(|contact| !is(&is_stable, self.most, contact))?;
-        if !is(&is_stable, self.value, shaken) {
+        let is_left = |around: &Loop| LEFT.holds(&margins(around));
+        let unstable = contacts.iter().find(|contact| !is(&is_stable, self.most, contact));
+        let shaken = unstable.or_else(|| contacts.iter().find(|contact| !is(&is_left, self.most, contact)))?;
+        if !is(&is_left, self.value, shaken) {
             return None;
         }
         let holds = |gain: &f64| contacts.iter().all(|one| is(&|around| KEPT.holds(&margins(around)), *gain, one));
         let tried = std::iter::successors(Some(self.most), |gain| Some(gain * 0.95)).take(TRIED);
         let best = tried.take_while(|gain| *gain > self.value).find(holds).map(down_to_two_digits);
         let (key, name, place) = (self.key, &self.feature.name, self.place);
-        let message = format!(
-            "`{}` may become {}, and the loop of `{name}` is then unstable {}",
-            self.name,
-            self.most,
-            over(shaken.name())
-        );
+        let gain_db = around(self.most, shaken).and_then(|around| margins(&around).gain_db).unwrap_or_default();
+        let then = match unstable {
+            Some(_) => format!("the loop of `{name}` is then unstable"),
+            None => format!("the gain margin of the loop of `{name}` is then only {gain_db:.1} dB"),
+        };
+        let message = format!("`{}` may become {}, and {then} {}", self.name, self.most, over(shaken.name()));
         let diagnostic = Diagnostic::new(Code::LowMargin, place.clone(), message)
             .note(mode.place_of_gain(self.feature, key), format!("`{key}` is {} as written", self.value));
         // A range that ends below the gain as written is a mistake.

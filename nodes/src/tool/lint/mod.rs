@@ -28,9 +28,10 @@
 //! | is a column used in no mode? | `unused_columns` |
 //! | does a gain do harm whatever is touched? | `gains` |
 //! | is a loop near instability over a contact? | `stability` |
+//! | is a loop too fast for an arm with springs in its joints? | `springs` |
 //! | may a change while the arm moves make one unstable? | `live` |
 //!
-//! `reach` asks `exit_bounds` and `deadbands`, `gains` asks `deadbands`, and `live` asks `stability`.
+//! `reach` asks `exit_bounds` and `deadbands`, `gains` asks `deadbands`, and `live` and `springs` ask `stability`.
 
 mod approach;
 mod arm;
@@ -52,6 +53,7 @@ mod presence;
 mod reach;
 mod recovery;
 mod rolling;
+mod springs;
 mod stability;
 mod unused_columns;
 mod wrong_columns;
@@ -67,7 +69,7 @@ use arm::{Arm, carried};
 use mode_law::ModeLaw;
 
 /// The checks of an arm, in the order of their warnings.
-const CHECKS: [fn(&Arm<'_>) -> Diagnostics; 11] = [
+const CHECKS: [fn(&Arm<'_>) -> Diagnostics; 12] = [
     contacts::misnamed,
     touches,
     reach::check,
@@ -77,6 +79,7 @@ const CHECKS: [fn(&Arm<'_>) -> Diagnostics; 11] = [
     presence::check,
     columns,
     gains::check,
+    springs::check,
     stability::check,
     live::check,
 ];

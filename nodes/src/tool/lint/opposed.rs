@@ -1,12 +1,14 @@
 //! Motions that work against each other in one mode, and motions into an object that is already pressed.
 
-use tactflow_runtime::source::{Code, Diagnostic, Diagnostics, Item, Table};
+use tactflow_runtime::source::{Code, Diagnostic, Diagnostics, Edit, Item, Table};
 
 use super::arm::Arm;
 use super::geometry::is_force;
 use super::guides::{holds, may_press, parks};
 use super::mode_law::ModeLaw;
+use super::stability::over;
 use crate::motion::COMPONENTS;
+use crate::tool::control::contacts::Contact;
 use crate::tool::control::digits::to_two_digits;
 use crate::tool::control::exits::Exit;
 use crate::tool::control::law::{Feature, Guidance};
@@ -14,7 +16,7 @@ use crate::tool::control::law::{Feature, Guidance};
 pub(super) fn check(arm: &Arm<'_>) -> Diagnostics {
     let mut found = Diagnostics::new();
     for mode in &arm.modes {
-        let contradiction = retreat(mode).or_else(|| held(mode)).or_else(|| push(arm, mode));
+        let contradiction = retreat(arm, mode).or_else(|| held(mode)).or_else(|| push(arm, mode));
         found.extend(
             contradiction
                 .or_else(|| pressed(arm, mode))
@@ -28,23 +30,37 @@ pub(super) fn check(arm: &Arm<'_>) -> Diagnostics {
 
 /// Returns the warning about a force that is controlled while the sensor moves away from the object: the contact does not
 /// end.
-fn retreat(mode: &ModeLaw<'_>) -> Option<Diagnostic> {
+fn retreat(arm: &Arm<'_>, mode: &ModeLaw<'_>) -> Option<Diagnostic> {
     let (node, speed) = away(mode)?;
     let presses = |feature: &&Feature| {
-        let least = feature.schedules.iter().map(|schedule| schedule.min).product::<f64>();
+        let (factor, _) = largest_factor(arm, feature);
         let limit = mode.gain(feature, "limit").unwrap_or(f64::INFINITY);
-        let most = feature.setpoint.map(|setpoint| (feature.kp * least * setpoint).min(limit) * feature.column[2]);
+        let most = feature.setpoint.map(|setpoint| (feature.kp * setpoint).min(limit) * factor * feature.column[2]);
         mode.quantity(feature).is_some_and(is_force)
             && feature.is_open_in_contact(&mode.nodes)
             && most.is_some_and(|most| most > 0.0 && most >= speed)
     };
     let feature = mode.moving().find(presses)?;
+    let (_, contact) = largest_factor(arm, feature);
+    let over = contact.map(|contact| format!(" {}", over(contact.name()))).unwrap_or_default();
     let message = format!(
-        "{}`{node}` moves the sensor away from the object, but `{}` presses it back: the contact does not end",
+        "{}`{node}` moves the sensor away from the object, but `{}` presses it back{over}: the contact does not end",
         mode.prefix(),
         feature.name
     );
     Some(report(mode, feature, message, &deselect(2)))
+}
+
+/// Returns the largest factor that the schedules of a feature have over a contact of the bench, and this contact [1]. Where
+/// no contact says how the feature answers, that is 1, and the smallest one of a schedule that follows anything else.
+fn largest_factor<'a>(arm: &'a Arm<'_>, feature: &Feature) -> (f64, Option<&'a Contact>) {
+    let schedules = &feature.schedules;
+    let factor = |contact: &Contact| schedules.iter().map(|one| one.factor(contact)).product::<Option<f64>>();
+    let known = arm.contacts.iter().filter(|_| !schedules.is_empty());
+    let known = known.filter_map(|contact| Some((factor(contact)?, Some(contact))));
+    let usual = schedules.iter().map(|schedule| schedule.nominal.map_or(schedule.min, |_| 1.0));
+    let usual = (usual.product(), None);
+    known.max_by(|(one, _), (other, _)| one.total_cmp(other)).unwrap_or(usual)
 }
 
 /// Returns the node that moves the sensor away from the object in a mode, and its speed [m/s].
@@ -75,7 +91,24 @@ fn held(mode: &ModeLaw<'_>) -> Option<Diagnostic> {
         feature.name,
         COMPONENTS[i]
     );
-    Some(report(mode, feature, message, &deselect(i)))
+    let (help, written) = release(mode, guide, i);
+    Some(written.into_iter().fold(report(mode, feature, message, &help), Diagnostic::edit))
+}
+
+/// Returns what to write so that a node no longer holds the sensor along a component that a feature moves.
+fn release(mode: &ModeLaw<'_>, guide: &Guidance, i: usize) -> (String, Option<Edit>) {
+    let name = guide.node();
+    let (key, value, why) = match &*guide.kind {
+        "follow_path" if i == 2 => {
+            ("in_plane", "true", "the path then lies in the plane of the pad, and leaves `vz` free")
+        }
+        "hold_pose" if i < 3 => ("speed_m_per_s", "0.0", "it then leaves the position free"),
+        _ => return (deselect(i), None),
+    };
+    // A default is written nowhere, so it has no text to replace.
+    let place =
+        Some(mode.place(name, key)).filter(|place| mode.nodes.node(name).is_some_and(|node| node.span != *place));
+    (format!("write `{key} = {value}` in `{name}`: {why}"), place.map(|place| Edit::Replace(place, value.to_owned())))
 }
 
 /// Returns the warning about a mode that moves on into the object that the modes before have pressed, where nothing that
@@ -98,7 +131,8 @@ fn push(arm: &Arm<'_>, mode: &ModeLaw<'_>) -> Option<Diagnostic> {
         constant.node,
         before.own_name()
     );
-    let help = "move along -z to leave the object, or let an exit wait for a force or for `touch.present`";
+    let help = "move along -z to leave the object, or let a `go` or `done` wait for a force: `touch.present` does not \
+                change while the sensor presses";
     Some(Diagnostic::new(Code::OpposedMotion, mode.place(&constant.node, "twist"), message).help(help))
 }
 

@@ -7,6 +7,7 @@ use super::arm::Arm;
 use super::deadbands::always_resting;
 use super::exit_bounds::exit_bounds;
 use super::mode_law::ModeLaw;
+use crate::tool::control::digits::to_three_digits;
 use crate::tool::control::exits::Exit;
 use crate::tool::control::law::Feature;
 use crate::tool::control::nodes::source;
@@ -44,7 +45,7 @@ fn thresholds(arm: &Arm<'_>, mode: &ModeLaw<'_>) -> Diagnostics {
 }
 
 /// Multiple of a threshold up to which a pressure hardly keeps its contact [1].
-const ABOVE: f64 = 1.05;
+const ABOVE: f64 = 1.15;
 
 /// Share of a limit from which on noise and overshoot reach it at a setpoint [1].
 const NEAR: f64 = 0.95;
@@ -130,9 +131,10 @@ pub(super) fn unreachable_setpoint(arm: &Arm<'_>, mode: &ModeLaw<'_>, feature: &
             format!(
                 "the setpoint of `{name}` is {setpoint}, but `{node}` drops {what} below {threshold}: {}",
                 if setpoint > threshold {
-                    "the contact is easily lost"
+                    let ratio = to_three_digits(setpoint / threshold);
+                    format!("with {ratio} times the threshold, noise ends the contact again and again")
                 } else {
-                    "the contact is lost before it is reached"
+                    "the contact is lost before it is reached".to_owned()
                 }
             ),
             format!(

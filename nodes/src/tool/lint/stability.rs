@@ -256,7 +256,7 @@ fn both(feature: &Feature, loops: &[Loop]) -> Option<[f64; 2]> {
 }
 
 /// Gain of a loop with which the recipe of docs/control.md begins [1/s].
-const FIRST_GAIN: f64 = 3.5;
+pub(super) const FIRST_GAIN: f64 = 3.5;
 
 /// Returns what to say of gains that are chosen by geometry, because the bench does not say how the object answers. A
 /// `kp` above that of the recipe is not named without it.
@@ -285,10 +285,9 @@ fn scheduled(
     contacts: &[Contact],
     object: Option<&str>,
 ) -> Vec<(Range<usize>, String)> {
-    let contact = contacts.iter().find(|contact| contact.name() == object);
-    let Some(answer) = contact.and_then(|contact| contact.answer(feature.quantity()?)) else { return Vec::new() };
+    let Some(contact) = contacts.iter().find(|contact| contact.name() == object) else { return Vec::new() };
     let larger = feature.schedules.iter().filter_map(|schedule| {
-        let factor = schedule.factor(&answer).filter(|factor| *factor > 1.0)?;
+        let factor = schedule.factor(contact).filter(|factor| *factor > 1.0)?;
         let note = format!("`{}` multiplies the gains by {factor:.1} {}", schedule.node, over(object));
         Some((mode.place(&schedule.node, "max"), note))
     });

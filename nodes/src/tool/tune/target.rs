@@ -107,7 +107,7 @@ fn is_measured(feature: &Feature) -> Result<(), String> {
 
 /// Refuses a feature whose gains are multiplied by what nothing says.
 fn has_a_known_schedule(feature: &Feature) -> Result<(), String> {
-    let unknown = feature.schedules.iter().find(|schedule| schedule.nominal.is_none());
+    let unknown = feature.schedules.iter().find(|schedule| !schedule.follows(feature.quantity()));
     unknown.map_or(Ok(()), |Schedule { node, .. }| {
         Err(format!(
             "`{node}` multiplies the gains of `{}` by what is not known: give it the `ratio` of a `stiffness_estimate` of \
