@@ -241,7 +241,10 @@ fn the_help_of_a_held_place_leaves_the_control_of_the_force() {
 #[test]
 fn a_gain_that_is_too_large_for_its_rise_is_to_become_smaller() {
     let text = help("hybrid", &["gains.x = { kp = 12.0, rise = 0.1 }", "set facts.arm.contacts=[]"]);
-    assert!(text.starts_with("write `kp = 3.1` or less for this `rise`, or `rise = 1.44` or more"), "{text}");
+    assert!(
+        text.starts_with("write `kp = 3.1` or less, which this `rise` can follow. Or write `rise = 1.44` or more"),
+        "{text}"
+    );
     let text = help("hybrid", &["gains.x = { kp = 3.0, rise = 0.005 }"]);
     assert!(text.starts_with("write `rise = 0.09` or more, or remove it"), "{text}");
 }

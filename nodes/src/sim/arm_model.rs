@@ -91,6 +91,7 @@ impl ArmModel {
     pub fn facts(&self, loaded: &LoadedArm) -> Result<Facts, Mistakes> {
         let mut facts = arm::facts(&self.urdf, &self.tip, Some(self.body.home.as_deref().unwrap_or(&loaded.start)))?;
         facts.push(("joint_n_m_per_rad".into(), self.body.stiffness.into()));
+        facts.push(("joint_damping_ratio".into(), self.body.damping_ratio.into()));
         Ok(facts)
     }
 

@@ -340,8 +340,8 @@ pub(super) fn good_by_modes() -> Vec<Variant> {
             "after_ms = 30000, after_travel_mm = 150",
             &["set facts.arm.clear_min_m=[-0.8, -0.4, 0.3]", "set facts.arm.clear_max_m=[-0.3, 0.4, 0.7]"],
         ),
-        // A pressure that is a fifth above the threshold of the pad.
-        variant("force", &["setpoint = { pressure = 0.018 }"]),
+        // A pressure of twice the threshold of the pad.
+        variant("force", &["setpoint = { pressure = 0.03 }"]),
         // Rolling that couples the axes a little, and a press that slides a little.
         variant("rolling", &["columns.x = [-1, 0, 0, 5, -20, 0]"]),
         variant("hybrid", &["columns.pressure = [0.3, 0, 1, 0, 0, 0]"]),

@@ -178,6 +178,8 @@ fn opened(params: Params) -> Result<(Description, Fri), Mistakes> {
     let mut facts = arm::facts(&params.urdf, &params.tip, params.home.as_deref())?;
     let stiffest = stiffness.map(|joints| joints.into_iter().fold(0.0, f64::max));
     facts.extend(stiffest.map(|stiffest| ("joint_n_m_per_rad".into(), stiffest.into())));
+    let least = damping.as_ref().map(|joints| joints.iter().copied().fold(1.0, f64::min));
+    facts.extend(least.map(|least| ("joint_damping_ratio".into(), least.into())));
     let ports = ArmPorts::fill(description.fills(arm::ROLE), &shape, facts);
     let weight = ToolWeight::new(params.tool_mass, params.tool_com);
     let force = WrenchPorts::fill(&mut description, [vec![pad::mount(&Mount::NONE)], weight.facts()].concat());

@@ -71,6 +71,8 @@ const MAX_STABLE_STEP: f64 = 2.0;
 const SMALL_ERROR: f64 = 0.001;
 /// Gain with which the recipe of docs/control.md begins [1/s].
 const USUAL_KP: f64 = 3.5;
+/// Smallest gain that is worth a name instead of a larger `rise` [1/s].
+const LEAST_KP: f64 = 1.0;
 /// An error within the noise of each feature [E].
 const TINY_ERROR: f64 = 0.0001;
 
@@ -134,8 +136,11 @@ impl Gains {
             );
             let least = format!("`rise = {:.2}` or more, or remove it", 10.0 * self.kp * self.kp * SMALL_ERROR);
             let most = libm::floor(10.0 * libm::sqrt(rise / (10.0 * SMALL_ERROR))) / 10.0;
-            let help = match self.kp > USUAL_KP && most > 0.0 {
-                true => format!("write `kp = {most:.1}` or less for this `rise`, or {least}: the arm then swings more"),
+            let help = match self.kp > USUAL_KP && most >= LEAST_KP {
+                true => format!(
+                    "write `kp = {most:.1}` or less, which this `rise` can follow. Or write {least}, but then the arm swings \
+                     more"
+                ),
                 false => format!("write {least}"),
             };
             return Some(warn(Code::UnusualGain, "rise", message)?.help(help));

@@ -20,7 +20,7 @@ pub(crate) struct Schedule {
     pub(crate) nominal: Option<f64>,
     /// Name of what answers, as a bench states it.
     #[serde(skip)]
-    quantity: String,
+    pub(crate) quantity: String,
 }
 
 impl Schedule {

@@ -112,11 +112,11 @@ fn law(mode: &ModeSummary, style: &Style) -> String {
 
 /// Says what multiplies the gains of a feature.
 fn scheduled(feature: &Feature, schedule: &Schedule) -> String {
-    let Schedule { node, min, max, nominal, .. } = schedule;
+    let Schedule { node, min, max, nominal, quantity } = schedule;
     let range = format!("from {} to {}", number(*min), number(*max));
     let by = match nominal {
         Some(nominal) => {
-            format!("by {} / (answer of the contact to vz), {range}. A run estimates this answer", number(*nominal))
+            format!("by {} / (answer of `{quantity}` to vz), {range}. A run estimates this answer", number(*nominal))
         }
         None => format!("{range}, by what this command does not know: there are no margins"),
     };

@@ -27,6 +27,8 @@ pub(super) struct Arm<'a> {
     pub(super) twist: String,
     /// What the bench declares that the arm touches.
     pub(super) contacts: Vec<Contact>,
+    /// Damping ratio of the springs in its joints; `None` if the arm states none.
+    pub(super) damping_ratio: Option<f64>,
     pub(super) modes: Vec<ModeLaw<'a>>,
 }
 
@@ -39,12 +41,13 @@ pub(super) fn carried(outline: &Outline) -> BTreeSet<&str> {
 }
 
 impl<'a> Arm<'a> {
-    /// Returns what moves an arm that touches these contacts; `None` if a chain of limiters leads to no node.
+    /// Returns what moves an arm with these facts; `None` if a chain of limiters leads to no node.
     pub(super) fn of(
         index: &'a Index<'a>,
         carried: &'a BTreeSet<&'a str>,
         command: Command<'a>,
         contacts: Vec<Contact>,
+        damping_ratio: Option<f64>,
     ) -> Option<Self> {
         let Chain { limits, twist, mounts } = chain(&Nodes::new(index, None), command.port).ok()?;
         let task = index.task_of(&twist);
@@ -53,7 +56,7 @@ impl<'a> Arm<'a> {
             ModeLaw { mode, carried, nodes, law: law_behind(&nodes, &twist, &mounts) }
         });
         let modes = modes.collect();
-        Some(Self { outline: index.outline(), name: command.arm, task, limits, twist, contacts, modes })
+        Some(Self { outline: index.outline(), name: command.arm, task, limits, twist, contacts, damping_ratio, modes })
     }
 
     /// Returns the objects of a simulated bench.

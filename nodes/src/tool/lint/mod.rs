@@ -97,7 +97,9 @@ pub(crate) fn lint(outline: &Outline, facts: &[(String, toml::Value)]) -> Diagno
             found.push(contacts::unreadable(outline, command.arm, why));
             Vec::new()
         });
-        let Some(arm) = Arm::of(&index, &carried, command, declared) else { continue };
+        let ratio = format!("{}.joint_damping_ratio", command.arm);
+        let ratio = facts.iter().find(|(fact, _)| *fact == ratio).and_then(|(_, value)| value.as_float());
+        let Some(arm) = Arm::of(&index, &carried, command, declared, ratio) else { continue };
         found.extend(without_consequences(CHECKS.iter().flat_map(|check| check(&arm)).collect()));
     }
     // Several modes, and several parts of the same file, read the same number.

@@ -102,7 +102,11 @@ fn release(mode: &ModeLaw<'_>, guide: &Guidance, i: usize) -> (String, Option<Ed
         "follow_path" if i == 2 => {
             ("in_plane", "true", "the path then lies in the plane of the pad, and leaves `vz` free")
         }
-        "hold_pose" if i < 3 => ("speed_m_per_s", "0.0", "it then leaves the position free"),
+        "hold_pose" if i < 3 => (
+            "speed_m_per_s",
+            "0.0",
+            "it then holds the orientation alone. To hold a part of the position too, put a `projector` behind it",
+        ),
         _ => return (deselect(i), None),
     };
     // A default is written nowhere, so it has no text to replace.

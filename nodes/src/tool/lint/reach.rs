@@ -132,7 +132,7 @@ pub(super) fn unreachable_setpoint(arm: &Arm<'_>, mode: &ModeLaw<'_>, feature: &
                 "the setpoint of `{name}` is {setpoint}, but `{node}` drops {what} below {threshold}: {}",
                 if setpoint > threshold {
                     let ratio = to_three_digits(setpoint / threshold);
-                    format!("with {ratio} times the threshold, noise ends the contact again and again")
+                    format!("with {ratio} times the threshold, the contact ends again and again")
                 } else {
                     "the contact is lost before it is reached".to_owned()
                 }

@@ -1,5 +1,7 @@
 //! Gains that are too large for an arm with springs in its joints, where no contact of the bench says how it swings.
 
+use std::f64::consts::PI;
+
 use tactflow_runtime::source::{Code, Diagnostic, Diagnostics, Edit};
 
 use super::arm::Arm;
@@ -9,34 +11,42 @@ use crate::tool::control::contacts::Contact;
 use crate::tool::control::digits::{down_to_two_digits, to_three_digits};
 use crate::tool::control::law::Feature;
 
-/// Gain of a loop with which an arm oscillates for ever that resonates at 5 Hz, with a damping ratio of 0.2: 4 π ζ f. Arms
-/// with springs in their joints resonate at 2 to 5 Hz, so they do from 5 1/s on [1/s].
-const SWINGS: f64 = 12.5;
+/// Frequency at which an arm with springs in its joints resonates at most [Hz].
+const RESONANCE: f64 = 5.0;
 
 pub(super) fn check(arm: &Arm<'_>) -> Diagnostics {
     let mut found = Diagnostics::new();
-    for mode in arm.modes.iter().filter(|mode| has_springs(arm, mode)) {
-        found.extend(mode.moving().filter_map(|feature| shaken(mode, feature, &arm.contacts_or_geometry())));
+    // With a resonance of f, and nothing else, a loop oscillates for ever with a gain of 4 π ζ f.
+    let Some(bears) = arm.damping_ratio.map(|ratio| 4.0 * PI * ratio * RESONANCE) else { return found };
+    for mode in &arm.modes {
+        found.extend(mode.moving().filter_map(|feature| shaken(mode, feature, &arm.contacts_or_geometry(), bears)));
     }
     found
 }
 
-/// Returns the warning about a place or an angle whose loop only geometry knows, with a gain that the springs in the joints
-/// do not bear.
-fn shaken(mode: &ModeLaw<'_>, feature: &Feature, contacts: &[Contact]) -> Option<Diagnostic> {
-    let quantity = mode.quantity(feature).filter(|quantity| matches!(*quantity, "x" | "y" | "orientation"))?;
-    let contact = contacts.first().filter(|_| contacts.iter().all(|contact| contact.is_by_geometry(quantity)))?;
-    let gain = feature.largest_schedule() * contact.answer(quantity)?.along(&feature.column);
-    let rate = feature.kp * gain;
-    if rate <= SWINGS {
+/// Returns the warning about a place whose loop only geometry knows, with a gain that the springs in the joints do not bear
+/// [1/s]. The angle of a line resonates faster.
+fn shaken(mode: &ModeLaw<'_>, feature: &Feature, contacts: &[Contact], bears: f64) -> Option<Diagnostic> {
+    let quantity = mode.quantity(feature).filter(|quantity| matches!(*quantity, "x" | "y"))?;
+    if !contacts.iter().all(|contact| contact.is_by_geometry(quantity)) {
+        return None;
+    }
+    let rate = |contact: &Contact| {
+        let factors = feature.schedules.iter().map(|schedule| schedule.factor(contact));
+        Some(factors.product::<Option<f64>>()? * contact.answer(quantity)?.along(&feature.column))
+    };
+    let rates = contacts.iter().filter_map(|contact| Some((contact, rate(contact)?)));
+    let (contact, gain) = rates.max_by(|(_, one), (_, other)| one.total_cmp(other))?;
+    if feature.kp * gain <= bears {
         return None;
     }
     let (name, place) = (&feature.name, mode.place_of_gain(feature, "kp"));
     let message = format!(
-        "the loop of `{name}` has a gain of {} 1/s {}, but the arm has springs in its joints: such an arm usually \
-         oscillates with 5 to 12.5 1/s",
-        to_three_digits(rate),
-        over(contact.name())
+        "the loop of `{name}` has a gain of {} 1/s {}, but the arm has springs in its joints: it begins to oscillate at {} \
+         1/s or before",
+        to_three_digits(feature.kp * gain),
+        over(contact.name()),
+        to_three_digits(bears)
     );
     let first = down_to_two_digits(FIRST_GAIN / gain);
     let help = format!(
@@ -44,11 +54,4 @@ fn shaken(mode: &ModeLaw<'_>, feature: &Feature, contacts: &[Contact]) -> Option
     );
     let edit = Edit::Replace(place.clone(), first.to_string());
     Some(Diagnostic::new(Code::LowMargin, place, message).help(help).edit(edit))
-}
-
-/// Returns whether the robot file states the stiffness of the joints.
-fn has_springs(arm: &Arm<'_>, mode: &ModeLaw<'_>) -> bool {
-    let limiters = arm.limits.iter().filter(|limiter| limiter.kind.ends_with("contact_limit"));
-    let mut nodes = limiters.filter_map(|limiter| mode.nodes.node(&limiter.node));
-    nodes.any(|node| mode.nodes.number(node, "joint_n_m_per_rad").is_some())
 }

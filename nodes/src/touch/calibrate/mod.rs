@@ -48,9 +48,9 @@ use super::common::halves::FREE;
 /// **Frames.** With `in.sum` and `in.peak`, wired to the `tactile_source` of the image, frames that are no measurement
 /// are dropped before any mean, and both images are absent for that time: the motion stops. A frame with a reading above
 /// `max_reading` is dropped, and one whose sum changes by more than `max_rise`. The frame after that one counts, so that
-/// an impact costs one frame. Without a `max_rise` it is learned after the self-test, during a contact: eight times the
-/// range of the sums that two frames in a row have reached. Before a contact, or without noise, it is not known, and no
-/// frame is dropped because of its sum. A pad whose self-test saw noise never sends one image three times in a
+/// an impact costs one frame. If `max_rise` is not given, this node learns it during a contact: eight times the range of
+/// the sum. A value counts for this range if three frames in a row reach it, and the range counts from twice the noise of
+/// a tactel times their number on. Before, or without noise, no frame is dropped because of its sum. A pad whose self-test saw noise never sends one image three times in a
 /// row: then the images are absent, and after 25 such frames the task ends with a fault. A pad that repeats its readings
 /// at rest may repeat them. A pad whose zero sinks hides a force: with a self-test and a `tare_bound`, the task ends with
 /// a fault if more than a quarter of the live readings are below their zeros by more than the bound, in three looks that
@@ -149,7 +149,7 @@ pub struct Params {
     #[param(unit = "U")]
     max_reading: Option<f64>,
     /// Largest possible change of the sum from frame to frame; a frame that changes by more is dropped, and the next one
-    /// counts. Without it, eight times the range of the sums so far, once they are those of a contact.
+    /// counts. If it is not given, it is learned during a contact: eight times the range of the sum.
     #[param(unit = "U", above = 0.0)]
     max_rise: Option<f64>,
 }
