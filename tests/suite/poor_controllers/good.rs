@@ -340,6 +340,16 @@ pub(super) fn good_by_modes() -> Vec<Variant> {
             "after_ms = 30000, after_travel_mm = 150",
             &["set facts.arm.clear_min_m=[-0.8, -0.4, 0.3]", "set facts.arm.clear_max_m=[-0.3, 0.4, 0.7]"],
         ),
+        // Springs with much damping bear more, and a schedule leaves a tenth of the gain over steel.
+        variant("explore", &["set nodes.pid.gains.x.kp=20.0", "set devices.bench.damping_ratio=0.7"]),
+        variant(
+            "hybrid",
+            &[
+                "features = [\"pressure\", \"x\"]",
+                "gains.x = { kp = 14.0 }",
+                "set facts.arm.contacts=[{ object = \"steel\", pressure = { vz = 100.0 } }]",
+            ],
+        ),
         // A pressure of twice the threshold of the pad.
         variant("force", &["setpoint = { pressure = 0.03 }"]),
         // Rolling that couples the axes a little, and a press that slides a little.

@@ -50,9 +50,9 @@ use super::common::halves::FREE;
 /// `max_reading` is dropped, and one whose sum changes by more than `max_rise`. The frame after that one counts, so that
 /// an impact costs one frame. If `max_rise` is not given, this node learns it during a contact: eight times the range of
 /// the sum. A value counts for this range if three frames in a row reach it, and the range counts from twice the noise of
-/// a tactel times their number on. Before, or without noise, no frame is dropped because of its sum. A pad whose self-test saw noise never sends one image three times in a
-/// row: then the images are absent, and after 25 such frames the task ends with a fault. A pad that repeats its readings
-/// at rest may repeat them. A pad whose zero sinks hides a force: with a self-test and a `tare_bound`, the task ends with
+/// a tactel times their number on. Before, or without noise, no frame is dropped because of its sum. A pad whose
+/// self-test saw noise never sends one image three times in a row: then the images are absent, and after 25 such frames
+/// the task ends with a fault. A pad that repeats its readings at rest may repeat them. A pad whose zero sinks hides a force: with a self-test and a `tare_bound`, the task ends with
 /// a fault if more than a quarter of the live readings are below their zeros by more than the bound, in three looks that
 /// are 8 frames apart.
 ///
