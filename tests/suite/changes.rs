@@ -21,7 +21,7 @@ fn hybrid() -> Request {
     let text = std::fs::read_to_string(&path).unwrap();
     let text = text.replace("[modes.servo]\n", "[modes.servo]\nset.pid.gains.pressure.ki = 0.11\n");
     // The control is the gain times the error from the first tick on.
-    let text = text.replace("gains.x = { kp = 3.3, rise = 0.25 }", "gains.x = { kp = 3.5 }");
+    let text = text.replace("gains.x = { kp = 3.0, rise = 0.25 }", "gains.x = { kp = 3.5 }");
     Request { text: Some(text + "pid.gains.x.kp = { min = 0.5, max = 5.0, rate = 2.0 }\n"), ..Request::file(path) }
 }
 

@@ -146,7 +146,7 @@ fn every_shipped_task_is_explained_for_a_person_and_for_a_page() {
     let page = say(&["explain", "graphs/hybrid.toml"]).out;
     for text in [
         "in the mode `servo`",
-        "-3.3",
+        "x                0  -3   0    0   0   0   0  3, 0, 0       50 ms (low_pass)",
         "`pid` lets the control of `x` grow by at most 0.25 m/s2",
         "`pid` brakes `y` where it moves faster than kp asks for, by more than 0.01 m/s.",
         "`pid` integrates errors of `pressure` up to 0.02 only",
@@ -168,9 +168,9 @@ fn the_latency_is_that_of_the_samples_the_filters_and_the_contact() {
     let modes = explained["motions"][0]["modes"].as_array().unwrap();
     let of = |mode: &str| modes.iter().find(|one| one["mode"] == mode).unwrap()["latencies"].as_array().unwrap();
     assert!(of("approach").is_empty(), "nothing is controlled");
-    // Half of a period of 8 ms, half of nine periods of the mean, and a low-pass of 50 ms.
+    // Half of a period of 8 ms, a low-pass of 50 ms for x and the pressure, and half of nine periods of its mean.
     for (found, (feature, to_command, to_image)) in
-        of("servo").iter().zip([("x", 0.004, Some(0.012)), ("y", 0.004, Some(0.005)), ("pressure", 0.09, None)])
+        of("servo").iter().zip([("x", 0.054, Some(0.012)), ("y", 0.004, Some(0.005)), ("pressure", 0.09, None)])
     {
         assert_eq!(found["feature"], feature);
         let near = |value: &Value, wanted: f64| (value.as_f64().unwrap() - wanted).abs() < 1e-9;
@@ -229,10 +229,10 @@ fn loops(args: &[&str]) -> Vec<Value> {
 fn margins_are_those_of_geometry_and_of_the_contacts_that_the_bench_states() {
     let alone = loops(&["graphs/hybrid.toml", "--set", "facts.arm.contacts=[]"]);
     let [x, _, pressure] = &alone[..] else { panic!("{alone:?}") };
-    // An integrator with a gain of 3.3 1/s.
-    let crossover = x["margins"]["crossover_hz"].as_f64().unwrap();
-    assert!((crossover - 3.3 / std::f64::consts::TAU).abs() < 1e-3, "{crossover}");
-    assert!((x["margins"]["ramp_lag_s"].as_f64().unwrap() - 1.0 / 3.3).abs() < 1e-9);
+    // An integrator with a gain of 3 1/s, and a low-pass of 50 ms: ω √(1 + (50 ms ω)²) = 3 1/s.
+    let crossover = x["margins"]["crossover_hz"].as_f64().unwrap() * std::f64::consts::TAU;
+    assert!((crossover * (0.05 * crossover).hypot(1.0) - 3.0).abs() < 1e-2, "{crossover}");
+    assert!((x["margins"]["ramp_lag_s"].as_f64().unwrap() - 1.0 / 3.0).abs() < 1e-9);
     assert_eq!((&x["object"], &pressure["margins"]), (&Value::Null, &Value::Null));
     let ball = r#"{ object = "ball", pressure = { vz = 10.0, resonance_hz = 2.4, damping_ratio = 0.35 } }"#;
     let stiff = "pressure = { vz = 17.0, resonance_hz = 5.0, damping_ratio = 0.3 }";
@@ -242,9 +242,9 @@ fn margins_are_those_of_geometry_and_of_the_contacts_that_the_bench_states() {
     assert_eq!(both.len(), 6);
     let phase = |one: &Value| one["margins"]["phase_deg"].as_f64().unwrap();
     assert!(both.iter().all(|one| one["margins"]["is_stable"] == true && phase(one) > 20.0), "{both:?}");
-    // The schedule divides the gain by the larger answer, and of x the latency costs margin: 3.3 1/s times 20 ms.
+    // The schedule divides the gain by the larger answer, and of x the latency costs margin: the crossover times 20 ms.
     assert!(phase(&both[2]) < phase(&both[5]));
-    assert!((phase(&both[0]) - phase(&both[3]) - (3.3 * 0.02_f64).to_degrees()).abs() < 0.1);
+    assert!((phase(&both[0]) - phase(&both[3]) - (crossover * 0.02).to_degrees()).abs() < 0.1);
     let page = say(&[&["explain"], &args[..]].concat()).out;
     assert!(page.contains("The worst loop is that of `pressure` over `"), "{page}");
 }

@@ -134,7 +134,7 @@ fn a_picture_that_cannot_be_written_is_found_before_the_robot_moves() {
 #[test]
 fn gains_beyond_their_live_range_are_tried_and_saved_with_a_wider_range() {
     let (_folder, path) = in_new_folder("hybrid.toml");
-    let text = shipped("hybrid.toml").replace("gains.x = { kp = 3.3", "gains.x = { kp = 0.7");
+    let text = shipped("hybrid.toml").replace("gains.x = { kp = 3.0", "gains.x = { kp = 0.7");
     let narrow = "\npid.gains.x.kp = { min = 0.5, max = 0.8, rate = 2.0 } # narrow\n";
     fs::write(&path, text.replace("\n[live]", "\n[live]\n#") + narrow).unwrap();
     let bench = Path::new(&path).with_file_name("ball.toml").display().to_string();

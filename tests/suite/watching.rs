@@ -188,9 +188,9 @@ fn an_arm_gets_another_graph_only_halted_and_the_graph_begins_halted() {
     let mut watched = Watched::start_with(&hybrid(), &REALTIME);
     watched.wait("out", "one tick every", 1);
     // With a mistake, the run goes on.
-    watched.save(&hybrid().replace("kp = 3.3", "kpp = 3.3"));
+    watched.save(&hybrid().replace("kp = 3.0", "kpp = 3.3"));
     watched.wait("err", "`kpp` is not a parameter here", 1);
-    watched.save(&hybrid().replace("kp = 3.3", "kp = 3.25"));
+    watched.save(&hybrid().replace("kp = 3.0", "kp = 3.25"));
     watched.wait("err", &format!("{WAITS}the task runs: send `stop` first"), 1);
     assert_eq!(watched.text("out").matches("one tick every").count(), 1, "it runs");
     watched.say("stop");
@@ -211,7 +211,7 @@ fn an_arm_gets_another_graph_only_halted_and_the_graph_begins_halted() {
 
 #[test]
 fn a_graph_that_is_mended_begins_halted_too() {
-    let mut watched = Watched::start_with(&hybrid().replace("kp = 3.3", "kpp = 3.3"), &REALTIME);
+    let mut watched = Watched::start_with(&hybrid().replace("kp = 3.0", "kpp = 3.3"), &REALTIME);
     watched.wait("err", "waiting until a file of the graph is saved", 1);
     watched.save(&hybrid());
     watched.wait("err", "nothing moves before `resume` is typed", 1);
@@ -227,7 +227,7 @@ fn an_arm_in_contact_keeps_its_graph() {
     sleep(Duration::from_millis(2500));
     watched.say("stop");
     sleep(Duration::from_millis(500));
-    watched.save(&hybrid().replace("kp = 3.3", "kp = 3.25"));
+    watched.save(&hybrid().replace("kp = 3.0", "kp = 3.25"));
     watched.wait("err", &format!("{WAITS}`touch.calibrate`: something touches the pad"), 1);
     sleep(Duration::from_millis(1500));
     let said = watched.text("err");

@@ -30,9 +30,17 @@ fn key(line: &str) -> &str {
     line.split('=').next().unwrap().trim()
 }
 
+/// The text of a task whose controller reads `x` directly: each change adds the only filter, or none.
+fn unfiltered(task: &str) -> String {
+    let text = std::fs::read_to_string(graph(task)).unwrap();
+    let Some((before, filter)) = text.split_once("[nodes.calm_x]") else { return text };
+    let after = filter.split_once("\n\n").unwrap().1;
+    (before.to_owned() + after).replace("calm_x.value", "touch.x")
+}
+
 impl Variant {
     pub(super) fn text(&self) -> String {
-        let text = std::fs::read_to_string(graph(self.task)).unwrap();
+        let text = unfiltered(self.task);
         let mut lines: Vec<String> = text.lines().map(str::to_owned).collect();
         for change in self.changes.iter().filter(|change| !change.starts_with("set ")) {
             match change.split_at(1) {
