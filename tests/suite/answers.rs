@@ -259,7 +259,7 @@ fn a_broken_graph_is_not_shown() {
 fn diagnostics_are_there_for_programs() {
     let said = json(&["check", HYBRID, "tests/errors/frame_mismatch.toml", "tests/errors/unused_node.toml"], 2);
     let lines = [
-        "graphs/hybrid.toml: ok True, 30 nodes, 0.004 s",
+        "graphs/hybrid.toml: ok True, 31 nodes, 0.004 s",
         "tests/errors/frame_mismatch.toml: ok False",
         "tests/errors/unused_node.toml: ok True, 28 nodes, 0.004 s",
     ];

@@ -151,7 +151,7 @@ fn every_shipped_task_is_explained_for_a_person_and_for_a_page() {
         "`pid` brakes `y` where it moves faster than kp asks for, by more than 0.01 m/s.",
         "`pid` integrates errors of `pressure` up to 0.02 only",
         "At rest: wx, wy, wz.",
-        "From a change of the contact to the command: 2 ms for `x`, `y`; 70 ms for `pressure`.",
+        "From a change of the contact to the command: 52 ms for `x`; 2 ms for `y`; 70 ms for `pressure`.",
         "with the latency of the pad: as in the measured response for `x` over `ball`, `pressure` over `ball`.",
         "`move.contact` (`contact_limit`)",
         "force_n = 15.0",

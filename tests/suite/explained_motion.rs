@@ -58,7 +58,9 @@ fn the_lag_behind_a_ramp_is_the_one_that_explain_prints() {
         let ramp = "[[inject]]\nrole = 'pad'\nfault = 'moving'\nfrom_s = 3.0\nvelocity_m_per_s = [0.002, 0, 0]\n";
         let lag = measured(&scenario(task, bench, &format!("{check}{ramp}")), "x", "mean").abs() / 0.002;
         let explained = of_loop(task, bench, "x", "ramp_lag_s");
-        assert!((lag / explained - 1.0).abs() < 0.2, "{task} on {bench}: {lag} s, explained {explained} s");
+        // An integral takes the lag away in 5 s.
+        let least = if task == "rolling" { 0.0 } else { 0.8 };
+        assert!((least..1.2).contains(&(lag / explained)), "{task} on {bench}: {lag} s, explained {explained} s");
     }
 }
 
@@ -100,8 +102,8 @@ pub(crate) fn swing(args: &[&str], [kp, ki]: [f64; 2]) -> f64 {
 fn a_loop_oscillates_by_itself_from_its_gain_margin_on() {
     let alone = ["--set", "nodes.schedule.min=1.0", "--set", "nodes.schedule.max=1.0"];
     for (task, bench, set, gains) in [
-        ("force", "pen", &alone[..], [0.5, 0.08]),
-        ("force", "toy_box", &alone[..], [0.5, 0.08]),
+        ("force", "pen", &alone[..], [0.6, 0.08]),
+        ("force", "toy_box", &alone[..], [0.6, 0.08]),
         ("edge", "edge", &[][..], [0.4, 0.08]),
     ] {
         let (graph, bench) = (format!("graphs/{task}.toml"), format!("graphs/benches/{bench}.toml"));
@@ -240,10 +242,11 @@ fn the_force_that_friction_spares_follows_a_little_less_than_printed() {
 
 #[test]
 fn the_bandwidth_of_a_flat_response_lies_in_its_range() {
-    // The arm resonates, and soft foam creeps: the response stays near 71 % for more than an octave.
+    // The arm resonates, and soft foam creeps: the response stays near 71 % for more than an octave. The play of x is
+    // 1.5 mm, and takes much of a step of 4 mm.
     for one in [
-        step("hybrid", "ball", "x", [0.0, 0.004]),
-        step("hybrid", "pen", "x", [0.0, 0.004]),
+        step("hybrid", "ball", "x", [0.0, 0.008]),
+        step("hybrid", "pen", "x", [0.0, 0.008]),
         step("rolling", "moved_ball", "pressure", [0.10, 0.115]),
         step("rolling", "moved_ball", "pressure", [0.10, 0.12]),
     ] {

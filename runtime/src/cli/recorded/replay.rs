@@ -24,7 +24,7 @@ use crate::source::quoted;
     after_help = "Examples:
   tactflow replay run.mcap
   tactflow replay run.mcap --from 12s --for 3s --out part.csv
-  tactflow replay run.mcap --set nodes.pid.gains.x.kp=3
+  tactflow replay run.mcap --set nodes.pid.gains.x.kp=2
 
 The graph and all its files are those in the recording. With --graph or --set, the recorded inputs
 reach another graph: the loop is open, because the devices do not answer to its commands.

@@ -55,7 +55,7 @@ pub use time::duration;
   tactflow run graphs/finger_press.toml --for 5s --out press.csv
   tactflow run graphs/hybrid.toml --svg hybrid.svg
   tactflow run graphs/explore.toml --points surface.ply
-  tactflow run graphs/hybrid.toml --set nodes.pid.gains.x.kp=3 --set devices.bench.rate_hz=500
+  tactflow run graphs/hybrid.toml --set nodes.pid.gains.x.kp=2 --set devices.bench.rate_hz=500
   tactflow run graphs/hybrid.toml --send 0.8s:stop --send 1.2s:resume
   tactflow run graphs/hybrid.toml --change 2s:pid.gains.y.kp=2
 
