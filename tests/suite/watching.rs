@@ -188,7 +188,7 @@ fn an_arm_gets_another_graph_only_halted_and_the_graph_begins_halted() {
     let mut watched = Watched::start_with(&hybrid(), &REALTIME);
     watched.wait("out", "one tick every", 1);
     // With a mistake, the run goes on.
-    watched.save(&hybrid().replace("kp = 3.0", "kpp = 3.3"));
+    watched.save(&hybrid().replace("kp = 3.0", "kpp = 3.0"));
     watched.wait("err", "`kpp` is not a parameter here", 1);
     watched.save(&hybrid().replace("kp = 3.0", "kp = 3.25"));
     watched.wait("err", &format!("{WAITS}the task runs: send `stop` first"), 1);
@@ -211,7 +211,7 @@ fn an_arm_gets_another_graph_only_halted_and_the_graph_begins_halted() {
 
 #[test]
 fn a_graph_that_is_mended_begins_halted_too() {
-    let mut watched = Watched::start_with(&hybrid().replace("kp = 3.0", "kpp = 3.3"), &REALTIME);
+    let mut watched = Watched::start_with(&hybrid().replace("kp = 3.0", "kpp = 3.0"), &REALTIME);
     watched.wait("err", "waiting until a file of the graph is saved", 1);
     watched.save(&hybrid());
     watched.wait("err", "nothing moves before `resume` is typed", 1);

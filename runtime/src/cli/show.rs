@@ -20,7 +20,7 @@ use crate::source::{Item, Key, Location, SourceMap, Value};
     name = "show",
     after_help = "Examples:
   tactflow show graphs/hybrid.toml
-  tactflow show graphs/hybrid.toml --set nodes.pid.gains.x.kp=3 --format json"
+  tactflow show graphs/hybrid.toml --set nodes.pid.gains.x.kp=2 --format json"
 )]
 pub(crate) struct ShowArgs {
     /// The graph file
