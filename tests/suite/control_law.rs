@@ -43,6 +43,8 @@ fn factor(schedule: &Value, row: &BTreeMap<String, f64>) -> f64 {
 
 /// The control that a controller may take from one tick to the next: it grows as its `rise` allows.
 fn grown(feature: &Value, wanted: f64, last: &BTreeMap<String, f64>, row: &BTreeMap<String, f64>) -> f64 {
+    let limit = feature["limit"].as_f64().unwrap_or(f64::INFINITY);
+    let wanted = wanted.clamp(-limit, limit);
     let Some(rise) = feature["rise"].as_f64() else { return wanted };
     let name = format!("pid.control.{}", feature["name"].as_str().unwrap());
     let control = last.get(&name).copied().unwrap_or(0.0);

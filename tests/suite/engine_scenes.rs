@@ -53,9 +53,7 @@ impl Row {
     /// What the reference changes in the task.
     fn reference(&self) -> Vec<&'static str> {
         let holds = |name| self.features.iter().any(|(feature, _)| *feature == name);
-        // Only `force` and `hybrid` damp the swing of the arm.
-        let force = if self.task == "rolling" { &FORCE[..3] } else { &FORCE };
-        let force = if holds("pressure") { force } else { &[] };
+        let force = if holds("pressure") { &FORCE[..] } else { &[] };
         let place = if holds("x") { &PLACE[..] } else { &[] };
         [force, place].concat()
     }
