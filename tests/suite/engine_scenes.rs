@@ -14,7 +14,8 @@ const SLOWER: (f64, f64) = (1.2, 0.05);
 /// Frames without a contact that a run may have after the first 25.
 const LOST: f64 = 25.0;
 
-/// The reference: constant gains, without `rise`, `limit`, schedule and damping.
+/// The reference: the filters of the task and constant gains, without `rise`, `limit`, `brake_above`, schedule and
+/// damping.
 const FORCE: [&str; 4] = [
     "nodes.pid.gains.pressure={ kp = 0.35, ki = 0.06, within = 0.02 }",
     "nodes.schedule.min=1.0",
