@@ -54,7 +54,7 @@ const EVENTS: [Event; 18] = [
     Event {
         task: "rolling",
         scene: "--scene ball --radius 0.031 --stiffness 1400 --joints 3000",
-        holds: &[("/lost", 0.0), ("/response/pressure", 0.8), ("/most", 5.0), ("/true_rms", 0.05)],
+        holds: &[("/lost", 0.0), ("/response/pressure", 0.8), ("/most", 5.5), ("/true_rms", 0.05)],
     },
     // Five times as stiff at once.
     Event {
@@ -94,7 +94,7 @@ const EVENTS: [Event; 18] = [
     Event {
         task: "hybrid",
         scene: "--scene box --stiffness 1000 --move 6 0.014 -0.014 0 --change 6 6.04",
-        holds: &[("/lost", 0.0), ("/after/response/x", 1.0), ("/after/response/y", 0.8)],
+        holds: &[("/lost", 0.0), ("/after/response/x", 1.0), ("/after/response/y", 1.1)],
     },
     // It turns by 6 degrees per second.
     Event {
