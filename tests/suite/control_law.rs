@@ -41,7 +41,7 @@ fn factor(schedule: &Value, row: &BTreeMap<String, f64>) -> f64 {
     (1.0 / ratio).clamp(bound("min"), bound("max"))
 }
 
-/// The control that a controller may take from one tick to the next: it grows as its `rise` allows.
+/// The control that a controller may take from one tick to the next: within its `limit`, and as its `rise` allows.
 fn grown(feature: &Value, wanted: f64, last: &BTreeMap<String, f64>, row: &BTreeMap<String, f64>) -> f64 {
     let limit = feature["limit"].as_f64().unwrap_or(f64::INFINITY);
     let wanted = wanted.clamp(-limit, limit);
