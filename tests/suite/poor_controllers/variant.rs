@@ -108,7 +108,7 @@ pub(super) fn approaching(end: &str, more: &[&str]) -> Variant {
     variant("force", &[&[&*fail], more].concat())
 }
 
-/// The task `force` with a mode that retreats with 20 mm/s while the pressure is controlled, by up to 24 mm/s.
+/// The task `force` with a mode that retreats with 20 mm/s while the pressure is controlled, by up to 30 mm/s.
 pub(super) fn leaving(more: &[&str]) -> Variant {
     let own = [
         "set modes.servo.go={ to = \"leave\", after_ms = 8000 }",
