@@ -113,7 +113,7 @@ fn an_arm_with_the_stiffness_of_its_robot_file_presses_faster_than_a_stiff_one()
     assert!(joints.out.contains("joint_n_m_per_rad = 300.0"), "{}{}", joints.out, joints.err);
     let few = explained(&["--set", "devices.bench.stiffness=[200, 200]"]);
     assert!(few.err.contains("the list has 2 entries, but the arm has 7 joints"), "{}", few.err);
-    // `force` presses with up to 40 mm/s: the limit of the force slows a stiff arm down.
+    // `force` presses with 30 mm/s at first: the limit of the force slows a stiff arm down.
     let slowed = |more: &[&str]| {
         let (said, _) = run("force", "--scene plane --seconds 2.5", more);
         assert_eq!(said.code, 0, "{}", said.err);

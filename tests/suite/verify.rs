@@ -462,7 +462,7 @@ fn a_scenario_runs_on_each_of_its_benches_and_names_them() {
     let names: Vec<&str> = scenarios.iter().map(|scenario| scenario["name"].as_str().unwrap()).collect();
     assert_eq!(names, ["both on ball", "both on pen"]);
     let force = |i: usize| scenarios[i]["rows"][0]["values"][0].as_f64().unwrap();
-    assert!((force(0) - force(1)).abs() > 0.1, "a ball and a pen have different forces");
+    assert!((force(0) - force(1)).abs() > 1e-3, "a ball and a pen have different forces");
     for file in ["both_on_ball-1.csv", "both_on_ball-2.csv", "both_on_pen-1.csv", "both_on_pen-2.csv"] {
         assert!(records.join(file).exists(), "{file}");
     }

@@ -26,8 +26,8 @@ use crate::usual::USUAL_M_PER_S;
 /// While the swing is absent, the motion passes unchanged. The swing ends with the contact, and then the motion jumps by at
 /// most `max_m_per_s`, so a `bumpless` stands behind this node. It damps whenever something touches the pad and a motion is
 /// wanted, also in a mode that selects no component. Forces along the pad, which it does not measure, bend the springs
-/// as well. So choose half of the rate for a task that centres a contact, and leave the node out of one that goes on
-/// moving along an object.
+/// as well. So choose 3 1/s for a task that centres a contact, and leave the node out of one that goes on moving along an
+/// object.
 ///
 /// Source: feedback of the torque of springs to damp a load (Hori, Sawada and Chun, Slow resonance ratio control, IEEE
 /// Transactions on Industrial Electronics 46, 1999), with the force on the pad for the torque of the load.

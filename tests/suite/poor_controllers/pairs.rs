@@ -77,7 +77,7 @@ pub(super) fn poor_pairs() -> Vec<(&'static str, Variant)> {
 /// Controllers that look alike, and are good.
 pub(super) fn good_pairs() -> Vec<Variant> {
     vec![
-        // Over steel, the schedule leaves 2.4 mm/s of the control.
+        // Over steel, the schedule leaves 3 mm/s of the control.
         leaving(&["set facts.arm.contacts=[{ object = \"steel\", pressure = { vz = 100.0 } }]"]),
         // A place that is controlled twice, toward the same setpoint.
         with_feature("hybrid", "beside", "touch.x", "[-1, 0, 0, 0, 0, 0]", &["gains.x = { kp = 2.0 }"]),
