@@ -54,7 +54,7 @@ const EVENTS: [Event; 18] = [
     Event {
         task: "rolling",
         scene: "--scene ball --radius 0.031 --stiffness 1400 --joints 3000",
-        holds: &[("/lost", 0.0), ("/response/pressure", 0.8), ("/most", 5.5), ("/true_rms", 0.05)],
+        holds: &[("/lost", 0.0), ("/response/pressure", 0.8), ("/most", 6.3), ("/true_rms", 0.05)],
     },
     // Five times as stiff at once.
     Event {
