@@ -7,6 +7,7 @@ mod live;
 mod mounts;
 mod pairs;
 mod poor;
+mod reach;
 mod variant;
 
 use std::collections::BTreeSet;
@@ -23,10 +24,8 @@ use good::{good, good_at_second_sight, good_behind_nodes, good_by_modes, good_by
 use live::{good_by_others, poor_by_others};
 use mounts::{good_mounts, half_turn, poor_mounts};
 use pairs::{good_pairs, poor_pairs};
-use poor::{
-    at_second_sight, never_reached, opposed, poor_behind_nodes, poor_filters_and_motions, poor_gains, poor_modes,
-    poor_sums,
-};
+use poor::{at_second_sight, opposed, poor_behind_nodes, poor_filters_and_motions, poor_gains, poor_modes, poor_sums};
+use reach::{never_present, never_reached};
 use variant::{graph, variant};
 
 fn codes(report: Option<&Report>) -> BTreeSet<&'static str> {
@@ -53,6 +52,7 @@ fn each_poor_controller_gets_its_warning_and_no_other() {
         poor_sums(),
         opposed(),
         never_reached(),
+        never_present(),
         at_second_sight(),
         poor_filters_and_motions(),
         poor_pairs(),
@@ -242,7 +242,9 @@ fn the_help_of_a_held_place_leaves_the_control_of_the_force() {
 fn a_gain_that_is_too_large_for_its_rise_is_to_become_smaller() {
     let text = help("hybrid", &["gains.x = { kp = 12.0, rise = 0.1 }", "set facts.arm.contacts=[]"]);
     assert!(
-        text.starts_with("write `kp = 3.1` or less, which this `rise` can follow. Or write `rise = 1.44` or more"),
+        text.starts_with(
+            "write `kp = 3.1` or less, which this `rise` can follow. An arm without springs in its joints"
+        ),
         "{text}"
     );
     let text = help("hybrid", &["gains.x = { kp = 3.0, rise = 0.005 }"]);

@@ -317,6 +317,12 @@ pub(super) fn good_by_modes() -> Vec<Variant> {
                 "set modes.away.done={ after_travel_mm = 10, of = \"move.sensor_pose\" }",
             ],
         ),
+        // It centres the contact from the first touch on, and goes on when the force is about that of the setpoint.
+        variant("hybrid", &["set modes.approach.set.projector.select=[0, 1, 0, 0, 0, 0]"]),
+        variant(
+            "force",
+            &["set modes.servo.done={ when = \"touch.pressure\", above = 0.09, below = 0.11, for_ms = 500 }"],
+        ),
         // It leaves an object that presses too hard, and lifts off before it searches along the object.
         variant(
             "edge",

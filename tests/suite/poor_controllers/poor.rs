@@ -67,77 +67,6 @@ pub(super) fn poor_behind_nodes() -> Vec<(&'static str, Variant)> {
     ]
 }
 
-/// Forces, places and errors that a mode never reaches, and loops that never get there.
-pub(super) fn never_reached() -> Vec<(&'static str, Variant)> {
-    let band = |feature: &str, width: &str, inside: &str| {
-        [
-            "set nodes.band.type=\"deadband\"".to_owned(),
-            "set nodes.band.in.error=\"error.error\"".to_owned(),
-            format!("set nodes.band.width.{feature}={width}"),
-            format!("set nodes.band.inside={inside:?}"),
-            "set nodes.pid.in.error=\"band.error\"".to_owned(),
-        ]
-    };
-    let banded = |task, changes: [String; 5]| Variant { task, bench: None, changes: changes.into() };
-    let window = [
-        "set nodes.box.type=\"image_window\"",
-        "set nodes.box.in.region=\"touch.region\"",
-        "set nodes.box.size=[0.02, 0.08]",
-        "set nodes.place.type=\"moments\"",
-        "set nodes.place.in.image=\"touch.repaired\"",
-        "set nodes.place.in.region=\"box.region\"",
-        "set nodes.error.in.x=\"place.x\"",
-        "set nodes.error.setpoint.x=0.015",
-    ];
-    vec![
-        ("unreachable-setpoint", banded("edge", band("pressure", "{ inner = 0.05, outer = 0.2 }", "absent"))),
-        ("unreachable-setpoint", banded("position", band("x", "{ inner = 0.05, outer = 0.06 }", "absent"))),
-        ("windup", banded("edge", band("orientation", "{ inner = 0.01, outer = 0.02 }", "zero"))),
-        ("unreachable-setpoint", variant("position", &window)),
-        (
-            "unreachable-setpoint",
-            variant(
-                "force",
-                &["set modes.servo.go={ to = \"approach\", when = \"touch.force\", above = 25.0, for_ms = 100 }"],
-            ),
-        ),
-        ("unreachable-setpoint", variant("force", &["set parts.touch.set.label.min_force=16.0"])),
-        ("unreachable-setpoint", variant("hold_without_slip", &["set nodes.grip.least_force=20.0"])),
-        // A contact that is lost before its force or its area is as small as that.
-        (
-            "unreachable-setpoint",
-            with_feature(
-                "edge",
-                "force",
-                "touch.force",
-                "[0, 0, 0.004, 0, 0, 0]",
-                &["set nodes.error.setpoint.force=0.3", "set parts.touch.set.label.min_force=0.4"],
-            ),
-        ),
-        ("unreachable-setpoint", banded("edge", band("orientation", "{ inner = 0.5, outer = 1.6 }", "absent"))),
-        ("unusual-gain", variant("hybrid", &["gains.x = { kp = 0.0 }"])),
-        ("unusual-gain", variant("rolling", &["gains.x = { kp = 2.0, limit = 0.0001 }"])),
-        ("unusual-gain", variant("edge", &["gains.pressure = { kd = 0.05 }"])),
-        ("unusual-gain", variant("hybrid", &["columns.x = [-0.001, 0, 0, 0, 0, 0]"])),
-        (
-            "unusual-gain",
-            variant("edge", &["gains.orientation = { kp = 7.0, ki = 7.0, within = 0.05, limit = 0.002 }"]),
-        ),
-        (
-            "unused-column",
-            variant(
-                "cable",
-                &[
-                    "set nodes.line2.type=\"curvature\"",
-                    "set nodes.line2.in.image=\"touch.repaired\"",
-                    "set nodes.line2.in.region=\"middle.region\"",
-                    "set nodes.bend.in.value=\"line2.rate\"",
-                ],
-            ),
-        ),
-    ]
-}
-
 /// Gains, filters and setpoints.
 pub(super) fn poor_gains() -> Vec<(&'static str, Variant)> {
     let stiff = "gains.pressure = { kp = 2.5, ki = 0.5, within = 0.02 }";
@@ -151,6 +80,8 @@ pub(super) fn poor_gains() -> Vec<(&'static str, Variant)> {
         ("low-margin", variant("position", &["gains.x = { kp = 17.5 }"])),
         ("low-margin", variant("edge", &[stiff])),
         ("low-margin", variant("edge", &["gains.orientation = { kp = 30.0, ki = 30.0, within = 0.05, limit = 0.7 }"])),
+        ("low-margin", variant("carry", &["set parts.right.set.pid.gains.force.kp=8.0"])),
+        ("low-margin", variant("two_arms", &["set parts.left.set.pid.gains.x.kp=8.0"])),
         ("low-margin", on("pen", variant("force", &[stiff]))),
         ("low-margin", on("pen", variant("hybrid", &[stiff]))),
         ("low-margin", on("toy_box", variant("force", &[stiff]))),
@@ -182,6 +113,7 @@ pub(super) fn poor_gains() -> Vec<(&'static str, Variant)> {
         ("windup", variant("hybrid", &["gains.pressure = { kp = 0.5, ki = 0.1 }"])),
         ("windup", on("pen", variant("force", &["gains.pressure = { kp = 0.5, ki = 0.1 }"]))),
         ("windup", variant("edge", &["gains.orientation = { kp = 6.0, ki = 6.0 }"])),
+        ("windup", variant("edge", &["gains.orientation = { kp = 6.0, ki = 6.0, within = 1.5 }"])),
         ("windup", variant("hybrid", &["gains.x = { kp = 3.3, ki = 1.0, limit = 0.2 }"])),
         ("windup", variant("hybrid", &["gains.pressure = { kp = 0.5, ki = 0.1, within = 5.0 }"])),
         ("unstable-gain", variant("hybrid", &["gains.x = { kp = 600.0 }"])),
@@ -191,6 +123,7 @@ pub(super) fn poor_gains() -> Vec<(&'static str, Variant)> {
         ("unreachable-setpoint", variant("force", &["setpoint = { pressure = 4.0 }"])),
         ("unreachable-setpoint", variant("force", &["setpoint = { pressure = 0.005 }"])),
         ("unreachable-setpoint", variant("carry", &["set parts.right.set.error.setpoint.force=7.0"])),
+        ("unusual-value", variant("seek_ridge", &["set nodes.ridge.on_above=1.0"])),
         ("unusual-value", variant("position", &["setpoint = { x = 0.2, y = 0.0 }"])),
         // Contacts that cannot be read check nothing.
         (

@@ -18,6 +18,11 @@ const MAX_FACTOR: f64 = 3.0;
 /// Smallest compliance, as a multiple of the stated one: that of an arm that hardly gives way [1].
 const MIN_FACTOR: f64 = 0.05;
 
+/// Measured forces are enough once they weigh this many times as much as what is stated [1].
+const ENOUGH: f64 = 10.0;
+/// After so long with enough forces, the swing of the first press has left what is learned [s].
+const LEARNED_S: f64 = 1.0;
+
 /// A force that misses the lead by more than this is no measurement [m].
 const MOST_SWING_M: f64 = 0.01;
 /// After forces have missed it for so long, what is wrong is the lead with which the contact began [s].
@@ -32,6 +37,10 @@ pub(super) struct Spring {
     products: f64,
     /// Sum of the squares of the deflection that is stated, of the same samples [m² s].
     squares: f64,
+    /// How many times as much as stated the arm gives way, so far; 0 before the first contact [1].
+    gives: f64,
+    /// Time of contact with enough forces [s].
+    learning: f64,
     /// The contact, while there is one.
     contact: Option<Contact>,
     /// For how long each force has missed the lead [s].
@@ -86,7 +95,11 @@ impl Spring {
         self.stated = Some((kept * self.stated.unwrap_or(STATED)).max(STATED_AT_LEAST));
         self.products = kept * self.products + lead * stated * dt;
         self.squares = kept * self.squares + stated * stated * dt;
-        let deflection = self.factor(compliance) * stated;
+        self.gives = self.factor(compliance);
+        if self.squares > ENOUGH * self.weight(compliance) {
+            self.learning += dt;
+        }
+        let deflection = self.gives * stated;
         contact.stayed += (lead - deflection - contact.stayed) * share(dt, SETTLE_S);
         contact.swing += (lead - deflection - contact.stayed - contact.swing) * share(dt, SMOOTH_S);
         self.contact = Some(contact);
@@ -98,11 +111,21 @@ impl Spring {
         (self.contact, self.missed) = (None, 0.0);
     }
 
+    /// Returns how many times as much as stated the arm gives way, once enough has been learned.
+    pub(super) fn learned(&self) -> Option<f64> {
+        (self.learning >= LEARNED_S).then_some(self.gives)
+    }
+
     /// Returns how many times as much as stated the arm gives way. One that the force cannot bend gives way as stated.
     fn factor(&self, compliance: f64) -> f64 {
-        let weight = self.stated.unwrap_or(STATED) * compliance * compliance;
+        let weight = self.weight(compliance);
         let whole = weight + self.squares;
         if whole > 0.0 { ((weight + self.products) / whole).clamp(MIN_FACTOR, MAX_FACTOR) } else { 1.0 }
+    }
+
+    /// Returns how much the stated compliance counts, beside [`Self::squares`] [m² s].
+    fn weight(&self, compliance: f64) -> f64 {
+        self.stated.unwrap_or(STATED) * compliance * compliance
     }
 }
 

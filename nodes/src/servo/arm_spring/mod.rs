@@ -9,6 +9,10 @@ use crate::motion::normal::{give, lead};
 
 use learned::Spring;
 
+/// Ratio of two stiffnesses from which on the stated one is called wrong. What is learned is within a tenth of the truth,
+/// and postures differ by less [1].
+const WRONG: f64 = 1.5;
+
 /// Measures how far the force on its pad bends the spring of a compliant arm, and how the arm swings.
 ///
 /// An arm with springs in its joints leads: its commanded equilibrium z_eq is ahead of its position z. With its mass m,
@@ -28,7 +32,8 @@ use learned::Spring;
 /// arm. Then a factor on it is fitted to lead and force, by least squares over the last 2 s of contact. The factor is
 /// between 1/20 and 3. What is stated counts as much as 0.1 s with 1 N at first, and less with each second of contact. So a
 /// wrong stiffness matters while the first press grows, and with 0.3 N for some seconds. The factor stays when the contact
-/// ends.
+/// ends. If it is below 2/3 or above 3/2 after a second of contact, the summary of the run says so, and which stiffness the
+/// joints have.
 ///
 /// Both outputs are absent while an input is absent. So they are absent while nothing touches the pad. They are also absent
 /// while the force misses the lead by more than 10 mm, as in a frame of garbage, while all commands are held, for an arm
@@ -128,6 +133,18 @@ impl Node for ArmSpring {
         }
         out.deflection.set(bent.deflection);
         out.swing.set(bent.swing);
+    }
+
+    fn found(&self, state: &State) -> Option<String> {
+        let (stated, gives) = (self.compliance?.recip(), state.spring.learned()?);
+        let (ratio, how) = if gives < 1.0 { (gives.recip(), "stiff") } else { (gives, "soft") };
+        (ratio > WRONG).then(|| {
+            let joints = stated / gives;
+            format!(
+                "the arm is {ratio:.1} times as {how} as stated, as if its joints had {joints:.0} N m/rad: write \
+                 `stiffness = {joints:.0}` in its robot file, so that the first press is right too"
+            )
+        })
     }
 }
 

@@ -101,6 +101,30 @@ fn the_true_compliance_is_learned_up_to_three_times_the_stated_one_and_stays_aft
 }
 
 #[test]
+fn a_stiffness_that_is_not_the_stated_one_is_found() {
+    let found = |times: f64, most: f64, samples: u32| {
+        let mut cell = Cell::new(JOINT, Unit::NEWTON);
+        for i in 0..samples {
+            let force = most - most * libm::exp(-0.02 * f64::from(i));
+            cell.step(force, times * COMPLIANCE * force);
+        }
+        cell.step(None, 0.0);
+        cell.rig.found()
+    };
+    assert_eq!(
+        found(0.25, 3.0, 1500).unwrap(),
+        "the arm is 4.0 times as stiff as stated, as if its joints had 799 N m/rad: write `stiffness = 799` in its robot \
+         file, so that the first press is right too"
+    );
+    assert!(found(2.0, 3.0, 1500).unwrap().starts_with("the arm is 2.0 times as soft as stated"));
+    for times in [0.7, 1.0, 1.45] {
+        assert_eq!(found(times, 3.0, 1500), None, "{times}");
+    }
+    assert_eq!(found(0.25, 3.0, 200), None, "the first press swings");
+    assert_eq!(found(0.25, 0.1, 2000), None, "so small forces hardly bend the arm");
+}
+
+#[test]
 fn a_stiff_arm_and_a_pad_without_newtons_say_nothing() {
     assert_eq!(Cell::new("", Unit::NEWTON).step(2.0, 0.01), None);
     assert_eq!(Cell::new(JOINT, Unit::RAW).step(2.0, 0.01), None);

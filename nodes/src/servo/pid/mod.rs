@@ -134,14 +134,13 @@ impl Gains {
                 "the control of `{name}` grows by {rise} {unit}/s in a second: it takes {time:.1} s to answer an error of \
                  {SMALL_ERROR} {unit}"
             );
-            let least = format!("`rise = {:.2}` or more, or remove it", 10.0 * self.kp * self.kp * SMALL_ERROR);
             let most = libm::floor(10.0 * libm::sqrt(rise / (10.0 * SMALL_ERROR))) / 10.0;
             let help = match self.kp > USUAL_KP && most >= LEAST_KP {
                 true => format!(
-                    "write `kp = {most:.1}` or less, which this `rise` can follow. Or write {least}, but then the arm swings \
-                     more"
+                    "write `kp = {most:.1}` or less, which this `rise` can follow. An arm without springs in its joints \
+                     needs no `rise`"
                 ),
-                false => format!("write {least}"),
+                false => format!("write `rise = {:.2}` or more, or remove it", 10.0 * self.kp * self.kp * SMALL_ERROR),
             };
             return Some(warn(Code::UnusualGain, "rise", message)?.help(help));
         }

@@ -67,7 +67,7 @@ pub struct Params {
     #[param(unit = "1", range = 0.0..=1.0, default = 0.02)]
     least_rise: f64,
     /// Above this eccentricity the contact is a ridge.
-    #[param(unit = "1", range = 0.0..=1.0, default = 0.95)]
+    #[param(unit = "1", range = 0.0..=1.0, usual = ..=0.98, default = 0.95)]
     on_above: f64,
     /// Below this eccentricity the contact is no longer a ridge.
     #[param(unit = "1", range = 0.0..=1.0, default = 0.9)]

@@ -126,7 +126,8 @@ impl<'a> Arm<'a> {
 
     /// Returns what an exit watches, through filters, or by the name that a part gives it.
     pub(super) fn watched(&self, mode: &ModeLaw<'_>, when: &str) -> Option<String> {
-        let measured = way(&mode.nodes, when).measured;
+        let when = self.port(when);
+        let measured = way(&mode.nodes, &when).measured;
         if let Some(quantity) = mode.quantity_of(&measured) {
             return Some(quantity.to_owned());
         }
@@ -134,5 +135,20 @@ impl<'a> Arm<'a> {
         let ports = self.outline.nodes.iter().flat_map(|node| &node.outputs);
         let mut inside = ports.filter(|port| port.name.strip_prefix(part).is_some_and(|rest| rest.starts_with('.')));
         inside.any(|port| mode.quantity_of(&port.name) == Some(name)).then(|| name.to_owned())
+    }
+
+    /// Returns whether an exit watches the measurement of a feature, through filters, or by the name that its part gives it.
+    pub(super) fn watches(&self, mode: &ModeLaw<'_>, when: &str, feature: &Feature) -> bool {
+        let (when, measured) = (self.port(when), feature.measured.as_deref().unwrap_or_default());
+        let is_of_part = |(part, name): (&str, &str)| {
+            mode.quantity(feature) == Some(name)
+                && measured.strip_prefix(part).is_some_and(|rest| rest.starts_with('.'))
+        };
+        way(&mode.nodes, &when).measured == measured || when.rsplit_once('.').is_some_and(is_of_part)
+    }
+
+    /// Returns the name in the whole graph of a port that a mode names as its task calls it.
+    fn port(&self, name: &str) -> String {
+        if self.task.is_empty() { name.to_owned() } else { format!("{}.{name}", self.task) }
     }
 }

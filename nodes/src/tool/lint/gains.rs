@@ -38,6 +38,9 @@ fn resting(arm: &Arm<'_>, mode: &ModeLaw<'_>, feature: &Feature) -> Option<Diagn
     Some(Diagnostic::new(Code::UnusualGain, place, message).help(help))
 }
 
+/// Share of the largest error of a feature from which on a `within` is no bound [1].
+const NEARLY: f64 = 0.9;
+
 /// Gain of a loop that needs a minute for two thirds of an error [1/s].
 const MIN_LOOP_GAIN: f64 = 1.0 / 60.0;
 
@@ -147,7 +150,7 @@ fn windup(arm: &Arm<'_>, mode: &ModeLaw<'_>, feature: &Feature) -> Option<Diagno
         return None;
     }
     let number = |key: &str| mode.gain(feature, key);
-    let is_bound = |error: f64| error < arm.largest_error(mode, feature);
+    let is_bound = |error: f64| error < NEARLY * arm.largest_error(mode, feature);
     if feature.ki == 0.0 || number("within").is_some_and(is_bound) || left_at(arm, mode, feature).is_some_and(is_bound)
     {
         return None;

@@ -133,15 +133,29 @@ fn are_apart(mode: &ModeLaw<'_>, high: &str, low: &str) -> bool {
     bounds.is_some_and(|((one, above, up), (other, below, down))| one == other && above - up >= below + down)
 }
 
-/// Returns why a comparison never sets its flag, and what mends it: it needs a larger force than a limit allows.
+/// Returns why a comparison never sets its flag, and what mends it: it needs a larger force than a limit allows, or a value
+/// that its port never has.
 fn out_of_reach(arm: &Arm<'_>, mode: &ModeLaw<'_>, flag: &str) -> Option<(String, String)> {
     let node = mode.nodes.writer(flag).filter(|node| node.kind.text == "compare")?;
-    let above = mode.nodes.number(node, "above")?;
     let port = way(&mode.nodes, source(node, "value")?).measured;
-    let quantity = mode.quantity_of(&port)?;
-    let (limit, key) = arm.force_limit(mode, quantity)?;
-    let mend = format!("write `above` well below {limit} in `{}`", node.name);
-    (above >= limit).then(|| (format!("which is set above {above}, where the limit `{key}` is {limit}"), mend))
+    let number = |key: &str| mode.nodes.number(node, key);
+    let limited = || {
+        let (above, (limit, key)) = (number("above")?, arm.force_limit(mode, mode.quantity_of(&port)?)?);
+        (above >= limit).then(|| (("above", above), format!("where the limit `{key}` is {limit}"), limit))
+    };
+    let [min, max] = mode.nodes.output(&port).and_then(|port| port.range).unwrap_or([f64::NEG_INFINITY, f64::INFINITY]);
+    let beyond = |key: &'static str, bound: f64, is_beyond: fn(&f64, &f64) -> bool| {
+        let value = number(key).filter(|value| is_beyond(value, &bound))?;
+        let of = if key == "above" { "most" } else { "least" };
+        Some(((key, value), format!("where `{port}` is {bound} at {of}"), bound))
+    };
+    let ((key, value), why, bound) =
+        limited().or_else(|| beyond("above", max, f64::ge)).or_else(|| beyond("below", min, f64::le))?;
+    let well = if key == "above" { "below" } else { "above" };
+    Some((
+        format!("which is set {key} {value}, {why}"),
+        format!("write `{key}` well {well} {bound} in `{}`", node.name),
+    ))
 }
 
 /// Returns whether a flag is the opposite of a contact.

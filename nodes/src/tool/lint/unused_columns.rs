@@ -13,10 +13,13 @@ use crate::tool::control::law::Feature;
 pub(super) fn check(arm: &Arm<'_>) -> Diagnostics {
     let Some(first) = arm.modes.first() else { return Diagnostics::new() };
     // Several nodes can turn the same control into motion.
-    let controls = |wanted: &Feature| {
-        let mut features = arm.modes.iter().flat_map(|mode| &mode.law.features);
-        features.any(|feature| feature.has_gains_of(wanted) && feature.moves())
+    let moved_in = |wanted: &Feature| {
+        let moves = |mode: &&ModeLaw<'_>| {
+            mode.law.features.iter().any(|feature| feature.has_gains_of(wanted) && feature.moves())
+        };
+        arm.modes.iter().find(moves)
     };
+    let controls = |wanted: &Feature| moved_in(wanted).is_some() && !is_before_touch(arm, wanted);
     let is_selected = |wanted: &Feature| {
         let mut features = arm.modes.iter().flat_map(|mode| &mode.law.features);
         features.any(|one| one.has_gains_of(wanted) && one.column != [0.0; 6])
@@ -28,19 +31,31 @@ pub(super) fn check(arm: &Arm<'_>) -> Diagnostics {
         // What to select: the components that change the feature, if its column has one of them.
         let geometry = first.quantity(feature).and_then(Geometry::of).filter(|geometry| geometry.changes(&column));
         let components = geometry.map(|geometry| geometry.components(" or "));
-        let (message, help) = match column == [0.0; 6] {
-            true => (
+        let (message, help) = match moved_in(feature) {
+            Some(mode) => (
+                format!(
+                    "the column of `{}` is selected only in mode `{}`, which ends at the first touch: its gains do nothing",
+                    feature.name,
+                    mode.own_name()
+                ),
+                format!(
+                    "select {} in a mode that has a contact, {}",
+                    components.unwrap_or_else(|| moved(&column)),
+                    without(arm, feature)
+                ),
+            ),
+            None if column == [0.0; 6] => (
                 format!("the column of `{}` is zero, so its gains do nothing", feature.name),
                 "write how the sensor should move for it, or remove the feature".to_owned(),
             ),
-            false if is_selected(feature) => (
+            None if is_selected(feature) => (
                 format!(
                     "`{0}` has gains only where no component of its column is selected: they do nothing",
                     feature.name
                 ),
                 format!("give `{}` a gain in a mode that selects its column, or remove the feature", feature.name),
             ),
-            false => (
+            None => (
                 format!("no mode selects a component of the column of `{}`, so its gains do nothing", feature.name),
                 format!(
                     "select {} in a projector, {}",
@@ -52,6 +67,28 @@ pub(super) fn check(arm: &Arm<'_>) -> Diagnostics {
         Some(Diagnostic::new(Code::UnusedColumn, first.place_of_column(feature), message).help(help))
     });
     found.collect()
+}
+
+/// Time for which a mode goes on after the first touch, and in which a feature moves the sensor by nothing that counts [ms].
+const TOUCH_MS: f64 = 200.0;
+
+/// Returns whether all modes in which what a feature measures moves the sensor end at the first touch.
+fn is_before_touch(arm: &Arm<'_>, feature: &Feature) -> bool {
+    let moves =
+        |mode: &&ModeLaw<'_>| mode.law.features.iter().any(|other| other.measured == feature.measured && other.moves());
+    arm.modes.iter().filter(moves).all(|mode| ends_at_touch(mode, feature))
+}
+
+/// Returns whether a mode waits for the contact that a feature measures, and ends there: until then the feature is absent.
+fn ends_at_touch(mode: &ModeLaw<'_>, feature: &Feature) -> bool {
+    let is_of_it = |port: &str| {
+        let part = port.rsplit_once('.').map(|(part, _)| part);
+        let measured = feature.measured.as_deref();
+        part.zip(measured).is_some_and(|(part, measured)| measured.starts_with(&format!("{part}.")))
+    };
+    mode.exits("go").any(|exit| {
+        exit.is_found() && exit.when().is_some_and(is_of_it) && exit.number("for_ms").unwrap_or(0.0) <= TOUCH_MS
+    })
 }
 
 /// Returns how to do without the gains of a feature.
