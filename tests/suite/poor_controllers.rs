@@ -20,7 +20,7 @@ use tactflow_tests::{catalogue, toml_files, workspace};
 use crate::cli::in_new_folder;
 use crate::control_law::explained;
 use columns::{more_wrong_columns, wrong_columns};
-use good::{good, good_at_second_sight, good_behind_nodes, good_by_modes, good_by_turns};
+use good::{good, good_at_second_sight, good_behind_nodes, good_by_exits, good_by_modes, good_by_turns};
 use live::{good_by_others, poor_by_others};
 use mounts::{good_mounts, half_turn, poor_mounts};
 use pairs::{good_pairs, poor_pairs};
@@ -89,6 +89,7 @@ fn no_good_controller_is_blamed() {
         good_at_second_sight(),
         good_by_turns(),
         good_by_modes(),
+        good_by_exits(),
         good_mounts(),
         good_pairs(),
         good_by_others(),
@@ -102,6 +103,18 @@ fn no_good_controller_is_blamed() {
         .map(|(variant, report)| format!("{}, {:?}\n{}", variant.task, variant.changes, report.render(false)))
         .collect();
     assert!(wrong.is_empty(), "{}", wrong.join("\n"));
+}
+
+#[test]
+fn both_arms_of_two_arms_have_the_contact_of_the_bench_whose_ball_they_press() {
+    let contacts = |bench: &str, arm: &str| {
+        let text = std::fs::read_to_string(workspace().join("graphs/benches").join(bench)).unwrap();
+        let bench: toml::Table = text.parse().unwrap();
+        bench["facts"][arm]["contacts"].clone()
+    };
+    for arm in ["left_arm", "right_arm"] {
+        assert_eq!(contacts("two_arms.toml", arm), contacts("ball.toml", "arm"), "{arm}");
+    }
 }
 
 #[test]

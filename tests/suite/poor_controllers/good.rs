@@ -317,12 +317,6 @@ pub(super) fn good_by_modes() -> Vec<Variant> {
                 "set modes.away.done={ after_travel_mm = 10, of = \"move.sensor_pose\" }",
             ],
         ),
-        // It centres the contact from the first touch on, and goes on when the force is about that of the setpoint.
-        variant("hybrid", &["set modes.approach.set.projector.select=[0, 1, 0, 0, 0, 0]"]),
-        variant(
-            "force",
-            &["set modes.servo.done={ when = \"touch.pressure\", above = 0.09, below = 0.11, for_ms = 500 }"],
-        ),
         // It leaves an object that presses too hard, and lifts off before it searches along the object.
         variant(
             "edge",
@@ -361,5 +355,35 @@ pub(super) fn good_by_modes() -> Vec<Variant> {
         // Rolling that couples the axes a little, and a press that slides a little.
         variant("rolling", &["columns.x = [-1, 0, 0, 5, -20, 0]"]),
         variant("hybrid", &["columns.pressure = [0.3, 0, 1, 0, 0, 0]"]),
+    ]
+}
+
+/// Features that move the sensor in some modes, and exits that wait for their values.
+pub(super) fn good_by_exits() -> Vec<Variant> {
+    vec![
+        // It centres the contact from the first touch on, and goes on when the force is about that of the setpoint.
+        variant("hybrid", &["set modes.approach.set.projector.select=[0, 1, 0, 0, 0, 0]"]),
+        variant(
+            "force",
+            &["set modes.servo.done={ when = \"touch.pressure\", above = 0.09, below = 0.11, for_ms = 500 }"],
+        ),
+        // It goes on at a value that is passed, and at a direction that two numbers state.
+        variant("force", &["set modes.servo.done={ when = \"touch.pressure\", above = 0.05, below = 0.095 }"]),
+        variant(
+            "edge",
+            &[
+                "set nodes.error.setpoint.orientation=1.5708",
+                "set modes.servo.done={ when = \"touch.orientation\", above = -1.6, below = -1.5, for_ms = 500 }",
+            ],
+        ),
+        // It reads `y` behind a filter until it holds the contact.
+        variant(
+            "hybrid",
+            &[
+                "set nodes.slow={ type = \"low_pass\", in.value = \"touch.y\", time_constant_ms = 20 }",
+                "set nodes.pick={ type = \"switch\", in.on = \"touch.y\", in.off = \"slow.value\", in.select = \"modes.servo\" }",
+                "set nodes.error.in.y=\"pick.value\"",
+            ],
+        ),
     ]
 }

@@ -123,7 +123,7 @@ pub(super) fn poor_gains() -> Vec<(&'static str, Variant)> {
         ("unreachable-setpoint", variant("force", &["setpoint = { pressure = 4.0 }"])),
         ("unreachable-setpoint", variant("force", &["setpoint = { pressure = 0.005 }"])),
         ("unreachable-setpoint", variant("carry", &["set parts.right.set.error.setpoint.force=7.0"])),
-        ("unusual-value", variant("seek_ridge", &["set nodes.ridge.on_above=1.0"])),
+        ("unusual-value", variant("seek_ridge", &["set nodes.ridge.on_above=0.985"])),
         ("unusual-value", variant("position", &["setpoint = { x = 0.2, y = 0.0 }"])),
         // Contacts that cannot be read check nothing.
         (

@@ -37,7 +37,8 @@ pub(super) struct Spring {
     products: f64,
     /// Sum of the squares of the deflection that is stated, of the same samples [m² s].
     squares: f64,
-    /// How many times as much as stated the arm gives way, so far; 0 before the first contact [1].
+    /// How many times as much as stated the arm gives way, by what was measured alone, at the last sample with enough forces;
+    /// 0 before it [1].
     gives: f64,
     /// Time of contact with enough forces [s].
     learning: f64,
@@ -95,11 +96,11 @@ impl Spring {
         self.stated = Some((kept * self.stated.unwrap_or(STATED)).max(STATED_AT_LEAST));
         self.products = kept * self.products + lead * stated * dt;
         self.squares = kept * self.squares + stated * stated * dt;
-        self.gives = self.factor(compliance);
         if self.squares > ENOUGH * self.weight(compliance) {
             self.learning += dt;
+            self.gives = (self.products / self.squares).clamp(MIN_FACTOR, MAX_FACTOR);
         }
-        let deflection = self.gives * stated;
+        let deflection = self.factor(compliance) * stated;
         contact.stayed += (lead - deflection - contact.stayed) * share(dt, SETTLE_S);
         contact.swing += (lead - deflection - contact.stayed - contact.swing) * share(dt, SMOOTH_S);
         self.contact = Some(contact);
@@ -111,9 +112,11 @@ impl Spring {
         (self.contact, self.missed) = (None, 0.0);
     }
 
-    /// Returns how many times as much as stated the arm gives way, once enough has been learned.
-    pub(super) fn learned(&self) -> Option<f64> {
-        (self.learning >= LEARNED_S).then_some(self.gives)
+    /// Returns how many times as much as stated the arm gives way, once enough has been learned, and whether this is a bound:
+    /// what can be learned ends there.
+    pub(super) fn learned(&self) -> Option<(f64, bool)> {
+        let is_bound = [MIN_FACTOR, MAX_FACTOR].contains(&self.gives);
+        (self.learning >= LEARNED_S).then_some((self.gives, is_bound))
     }
 
     /// Returns how many times as much as stated the arm gives way. One that the force cannot bend gives way as stated.

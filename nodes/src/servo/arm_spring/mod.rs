@@ -9,8 +9,7 @@ use crate::motion::normal::{give, lead};
 
 use learned::Spring;
 
-/// Ratio of two stiffnesses from which on the stated one is called wrong. What is learned is within a tenth of the truth,
-/// and postures differ by less [1].
+/// Ratio of two stiffnesses from which on the stated one is called wrong: what is learned is within 15 % of the truth [1].
 const WRONG: f64 = 1.5;
 
 /// Measures how far the force on its pad bends the spring of a compliant arm, and how the arm swings.
@@ -32,8 +31,8 @@ const WRONG: f64 = 1.5;
 /// arm. Then a factor on it is fitted to lead and force, by least squares over the last 2 s of contact. The factor is
 /// between 1/20 and 3. What is stated counts as much as 0.1 s with 1 N at first, and less with each second of contact. So a
 /// wrong stiffness matters while the first press grows, and with 0.3 N for some seconds. The factor stays when the contact
-/// ends. If it is below 2/3 or above 3/2 after a second of contact, the summary of the run says so, and which stiffness the
-/// joints have.
+/// ends. If it is below 2/3 or above 3/2 after a second of contact with enough force, the summary of the run says so, and which
+/// stiffness the joints have.
 ///
 /// Both outputs are absent while an input is absent. So they are absent while nothing touches the pad. They are also absent
 /// while the force misses the lead by more than 10 mm, as in a frame of garbage, while all commands are held, for an arm
@@ -136,13 +135,17 @@ impl Node for ArmSpring {
     }
 
     fn found(&self, state: &State) -> Option<String> {
-        let (stated, gives) = (self.compliance?.recip(), state.spring.learned()?);
+        let (stated, (gives, is_bound)) = (self.compliance?.recip(), state.spring.learned()?);
         let (ratio, how) = if gives < 1.0 { (gives.recip(), "stiff") } else { (gives, "soft") };
+        let joints = match is_bound {
+            true => String::new(),
+            false => format!(", as if its joints had {:.0} N m/rad", stated / gives),
+        };
+        let least = if is_bound { "at least " } else { "" };
         (ratio > WRONG).then(|| {
-            let joints = stated / gives;
             format!(
-                "the arm is {ratio:.1} times as {how} as stated, as if its joints had {joints:.0} N m/rad: write \
-                 `stiffness = {joints:.0}` in its robot file, so that the first press is right too"
+                "the arm is {least}{ratio:.1} times as {how} as stated{joints}: correct `stiffness` in its robot file, or the \
+                 controller if the device sends it this number"
             )
         })
     }

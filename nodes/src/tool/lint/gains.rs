@@ -8,7 +8,7 @@ use super::geometry::is_force;
 use super::mode_law::ModeLaw;
 use super::reach::unreachable;
 use crate::tool::control::contacts::Answer;
-use crate::tool::control::digits::to_two_digits;
+use crate::tool::control::digits::{to_three_digits, to_two_digits};
 use crate::tool::control::law::Feature;
 
 pub(super) fn check(arm: &Arm<'_>) -> Diagnostics {
@@ -38,8 +38,8 @@ fn resting(arm: &Arm<'_>, mode: &ModeLaw<'_>, feature: &Feature) -> Option<Diagn
     Some(Diagnostic::new(Code::UnusualGain, place, message).help(help))
 }
 
-/// Share of the largest error of a feature from which on a `within` is no bound [1].
-const NEARLY: f64 = 0.9;
+/// Largest `within` that is a bound, as a share of the largest error of its feature: noise takes more away [1].
+const MOST_WITHIN: f64 = 0.9;
 
 /// Gain of a loop that needs a minute for two thirds of an error [1/s].
 const MIN_LOOP_GAIN: f64 = 1.0 / 60.0;
@@ -150,7 +150,8 @@ fn windup(arm: &Arm<'_>, mode: &ModeLaw<'_>, feature: &Feature) -> Option<Diagno
         return None;
     }
     let number = |key: &str| mode.gain(feature, key);
-    let is_bound = |error: f64| error < NEARLY * arm.largest_error(mode, feature);
+    let largest = arm.largest_error(mode, feature);
+    let is_bound = |error: f64| error < MOST_WITHIN * largest;
     if feature.ki == 0.0 || number("within").is_some_and(is_bound) || left_at(arm, mode, feature).is_some_and(is_bound)
     {
         return None;
@@ -168,11 +169,21 @@ fn windup(arm: &Arm<'_>, mode: &ModeLaw<'_>, feature: &Feature) -> Option<Diagno
         return None;
     }
     let name = &feature.name;
+    let (why, within, key) = match number("within") {
+        Some(own) => (
+            format!(
+                ", because its `within` of {own} is more than nine tenths of the largest error, {}",
+                to_three_digits(largest)
+            ),
+            "a smaller `within`",
+            "within",
+        ),
+        None => (String::new(), "`within`", "ki"),
+    };
     let message = format!(
-        "the integral of `{name}` grows at every error that occurs. At last it alone moves the sensor at full speed: it \
-         winds up while the contact sticks or the object moves, and overshoots"
+        "the integral of `{name}` grows at every error that occurs{why}. At last it alone moves the sensor at full speed: \
+         it winds up while the contact sticks or the object moves, and overshoots"
     );
-    let (within, key) = if number("within").is_some() { ("a smaller `within`", "within") } else { ("`within`", "ki") };
     let example = usual_within(mode, feature).filter(|within| is_bound(*within));
     let example = example.map(|within| format!(", for example `within = {within}`")).unwrap_or_default();
     let help = format!("write {within} in the gains of `{name}`, about five times its noise{example}");

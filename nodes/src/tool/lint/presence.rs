@@ -138,24 +138,34 @@ fn are_apart(mode: &ModeLaw<'_>, high: &str, low: &str) -> bool {
 fn out_of_reach(arm: &Arm<'_>, mode: &ModeLaw<'_>, flag: &str) -> Option<(String, String)> {
     let node = mode.nodes.writer(flag).filter(|node| node.kind.text == "compare")?;
     let port = way(&mode.nodes, source(node, "value")?).measured;
-    let number = |key: &str| mode.nodes.number(node, key);
-    let limited = || {
-        let (above, (limit, key)) = (number("above")?, arm.force_limit(mode, mode.quantity_of(&port)?)?);
-        (above >= limit).then(|| (("above", above), format!("where the limit `{key}` is {limit}"), limit))
+    let [above, below] = ["above", "below"].map(|key| mode.nodes.number(node, key));
+    let limit = mode.quantity_of(&port).and_then(|quantity| arm.force_limit(mode, quantity));
+    let range = mode.nodes.output(&port).and_then(|port| port.range);
+    let limited = limit.filter(|(limit, _)| above.is_some_and(|above| above >= *limit));
+    let [too_large, too_small] = [
+        range.map(|[_, max]| max).filter(|max| above.is_some_and(|above| above >= *max)),
+        range.map(|[min, _]| min).filter(|min| below.is_some_and(|below| below <= *min)),
+    ];
+    let name = &node.name;
+    let (asked, why, mend) = match (limited, too_large, too_small) {
+        (Some((limit, key)), ..) => (
+            format!("above {}", above?),
+            format!("the limit `{key}` is {limit}"),
+            format!("write `above` well below {limit} in `{name}`"),
+        ),
+        (_, Some(max), _) => (
+            format!("above {}", above?),
+            format!("`{port}` is at most {max}"),
+            format!("write `above` well below {max} in `{name}`"),
+        ),
+        (.., Some(min)) => (
+            format!("below {}", below?),
+            format!("`{port}` is at least {min}"),
+            format!("write `below` well above {min} in `{name}`"),
+        ),
+        _ => return None,
     };
-    let [min, max] = mode.nodes.output(&port).and_then(|port| port.range).unwrap_or([f64::NEG_INFINITY, f64::INFINITY]);
-    let beyond = |key: &'static str, bound: f64, is_beyond: fn(&f64, &f64) -> bool| {
-        let value = number(key).filter(|value| is_beyond(value, &bound))?;
-        let of = if key == "above" { "most" } else { "least" };
-        Some(((key, value), format!("where `{port}` is {bound} at {of}"), bound))
-    };
-    let ((key, value), why, bound) =
-        limited().or_else(|| beyond("above", max, f64::ge)).or_else(|| beyond("below", min, f64::le))?;
-    let well = if key == "above" { "below" } else { "above" };
-    Some((
-        format!("which is set {key} {value}, {why}"),
-        format!("write `{key}` well {well} {bound} in `{}`", node.name),
-    ))
+    Some((format!("which is set {asked}, but {why}"), mend))
 }
 
 /// Returns whether a flag is the opposite of a contact.
