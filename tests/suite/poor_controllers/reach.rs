@@ -38,21 +38,6 @@ pub(super) fn never_reached() -> Vec<(&'static str, Variant)> {
         ),
         ("unreachable-setpoint", variant("force", &["set parts.touch.set.label.min_force=16.0"])),
         ("unreachable-setpoint", variant("hold_without_slip", &["set nodes.grip.least_force=20.0"])),
-        // `press` waits for 1.8 to 2.2 N.
-        (
-            "unreachable-setpoint",
-            variant(
-                "carry",
-                &["set parts.left.set.error.setpoint.force=2.5", "set parts.right.set.error.setpoint.force=2.5"],
-            ),
-        ),
-        (
-            "unreachable-setpoint",
-            variant(
-                "force",
-                &["set modes.servo.done={ when = \"touch.pressure\", above = 0.11, below = 0.12, for_ms = 500 }"],
-            ),
-        ),
         // A contact that is lost before its force or its area is as small as that.
         (
             "unreachable-setpoint",

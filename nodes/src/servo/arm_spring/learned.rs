@@ -112,11 +112,11 @@ impl Spring {
         (self.contact, self.missed) = (None, 0.0);
     }
 
-    /// Returns how many times as much as stated the arm gives way, once enough has been learned, and whether this is a bound:
-    /// what can be learned ends there.
+    /// Returns how many times as much as stated the arm gives way, once enough has been learned, and whether this is
+    /// the smallest or the largest number that can be learned.
     pub(super) fn learned(&self) -> Option<(f64, bool)> {
-        let is_bound = [MIN_FACTOR, MAX_FACTOR].contains(&self.gives);
-        (self.learning >= LEARNED_S).then_some((self.gives, is_bound))
+        let is_end = [MIN_FACTOR, MAX_FACTOR].contains(&self.gives);
+        (self.learning >= LEARNED_S).then_some((self.gives, is_end))
     }
 
     /// Returns how many times as much as stated the arm gives way. One that the force cannot bend gives way as stated.

@@ -9,7 +9,8 @@ use crate::motion::normal::{give, lead};
 
 use learned::Spring;
 
-/// Ratio of two stiffnesses from which on the stated one is called wrong: what is learned is within 15 % of the truth [1].
+/// Ratio of two stiffnesses from which on the stated one is called wrong: what is learned is within 15 %
+/// of the truth where that was measured (decision 056) [1].
 const WRONG: f64 = 1.5;
 
 /// Measures how far the force on its pad bends the spring of a compliant arm, and how the arm swings.
@@ -32,7 +33,7 @@ const WRONG: f64 = 1.5;
 /// between 1/20 and 3. What is stated counts as much as 0.1 s with 1 N at first, and less with each second of contact. So a
 /// wrong stiffness matters while the first press grows, and with 0.3 N for some seconds. The factor stays when the contact
 /// ends. If it is below 2/3 or above 3/2 after a second of contact with enough force, the summary of the run says so, and which
-/// stiffness the joints have.
+/// stiffness the joints have, unless the factor is at its bound.
 ///
 /// Both outputs are absent while an input is absent. So they are absent while nothing touches the pad. They are also absent
 /// while the force misses the lead by more than 10 mm, as in a frame of garbage, while all commands are held, for an arm
@@ -135,13 +136,13 @@ impl Node for ArmSpring {
     }
 
     fn found(&self, state: &State) -> Option<String> {
-        let (stated, (gives, is_bound)) = (self.compliance?.recip(), state.spring.learned()?);
+        let (stated, (gives, is_end)) = (self.compliance?.recip(), state.spring.learned()?);
         let (ratio, how) = if gives < 1.0 { (gives.recip(), "stiff") } else { (gives, "soft") };
-        let joints = match is_bound {
+        let joints = match is_end {
             true => String::new(),
             false => format!(", as if its joints had {:.0} N m/rad", stated / gives),
         };
-        let least = if is_bound { "at least " } else { "" };
+        let least = if is_end { "at least " } else { "" };
         (ratio > WRONG).then(|| {
             format!(
                 "the arm is {least}{ratio:.1} times as {how} as stated{joints}: correct `stiffness` in its robot file, or the \

@@ -137,19 +137,6 @@ impl<'a> Arm<'a> {
         inside.any(|port| mode.quantity_of(&port.name) == Some(name)).then(|| name.to_owned())
     }
 
-    /// Returns whether an exit watches the measurement of a feature, through filters, or by the name that its part gives it
-    /// if one port of the part alone measures that.
-    pub(super) fn watches(&self, mode: &ModeLaw<'_>, when: &str, feature: &Feature) -> bool {
-        let (when, measured) = (self.port(when), feature.measured.as_deref().unwrap_or_default());
-        let is_alone = |(part, name): (&str, &str)| {
-            let inside = |port: &str| port.strip_prefix(part).is_some_and(|rest| rest.starts_with('.'));
-            let ports = self.outline.nodes.iter().flat_map(|node| &node.outputs).map(|port| &*port.name);
-            let mut measuring = ports.filter(|port| inside(port) && mode.quantity_of(port) == Some(name));
-            measuring.next() == Some(measured) && measuring.next().is_none()
-        };
-        way(&mode.nodes, &when).measured == measured || when.rsplit_once('.').is_some_and(is_alone)
-    }
-
     /// Returns the name in the whole graph of a port that a mode names as its task calls it.
     pub(super) fn port(&self, name: &str) -> String {
         if self.task.is_empty() { name.to_owned() } else { format!("{}.{name}", self.task) }

@@ -38,7 +38,7 @@ fn resting(arm: &Arm<'_>, mode: &ModeLaw<'_>, feature: &Feature) -> Option<Diagn
     Some(Diagnostic::new(Code::UnusualGain, place, message).help(help))
 }
 
-/// Largest `within` that is a bound, as a share of the largest error of its feature: noise takes more away [1].
+/// A `within` bounds an integral below this share of the largest error [1].
 const MOST_WITHIN: f64 = 0.9;
 
 /// Gain of a loop that needs a minute for two thirds of an error [1/s].
@@ -172,7 +172,7 @@ fn windup(arm: &Arm<'_>, mode: &ModeLaw<'_>, feature: &Feature) -> Option<Diagno
     let (why, within, key) = match number("within") {
         Some(own) => (
             format!(
-                ", because its `within` of {own} is more than nine tenths of the largest error, {}",
+                ", because its `within` of {own} is at least nine tenths of the largest error, {}",
                 to_three_digits(largest)
             ),
             "a smaller `within`",

@@ -17,7 +17,7 @@
 //! | does a mode wait for a contact without a motion? | `approach` |
 //! | does the blind limit stop a search before it fails? | `blind` |
 //! | is a setpoint or a threshold out of reach? | `reach` |
-//! | does an exit wait for too large a force, or beside a setpoint? | `exit_bounds` |
+//! | does an exit wait for too large a force? | `exit_bounds` |
 //! | does a feature always rest in a deadband, or move through it? | `deadbands` |
 //! | is a place controlled along a line? | `lines` |
 //! | do motions work against each other? | `opposed` |

@@ -141,25 +141,23 @@ fn out_of_reach(arm: &Arm<'_>, mode: &ModeLaw<'_>, flag: &str) -> Option<(String
     let [above, below] = ["above", "below"].map(|key| mode.nodes.number(node, key));
     let limit = mode.quantity_of(&port).and_then(|quantity| arm.force_limit(mode, quantity));
     let range = mode.nodes.output(&port).and_then(|port| port.range);
-    let limited = limit.filter(|(limit, _)| above.is_some_and(|above| above >= *limit));
-    let [too_large, too_small] = [
-        range.map(|[_, max]| max).filter(|max| above.is_some_and(|above| above >= *max)),
-        range.map(|[min, _]| min).filter(|min| below.is_some_and(|below| below <= *min)),
-    ];
+    let limited = above.zip(limit).filter(|(above, (limit, _))| above >= limit);
+    let too_large = above.zip(range).filter(|(above, [_, max])| above >= max);
+    let too_small = below.zip(range).filter(|(below, [min, _])| below <= min);
     let name = &node.name;
     let (asked, why, mend) = match (limited, too_large, too_small) {
-        (Some((limit, key)), ..) => (
-            format!("above {}", above?),
+        (Some((above, (limit, key))), ..) => (
+            format!("above {above}"),
             format!("the limit `{key}` is {limit}"),
             format!("write `above` well below {limit} in `{name}`"),
         ),
-        (_, Some(max), _) => (
-            format!("above {}", above?),
+        (_, Some((above, [_, max])), _) => (
+            format!("above {above}"),
             format!("`{port}` is at most {max}"),
             format!("write `above` well below {max} in `{name}`"),
         ),
-        (.., Some(min)) => (
-            format!("below {}", below?),
+        (.., Some((below, [min, _]))) => (
+            format!("below {below}"),
             format!("`{port}` is at least {min}"),
             format!("write `below` well above {min} in `{name}`"),
         ),

@@ -34,28 +34,28 @@ fn unused(arm: &Arm<'_>, first: &ModeLaw<'_>, feature: &Feature) -> Option<(Stri
         return same.all(|(mode, one)| ends_at_touch(arm, mode, one)).then(|| {
             (
                 format!(
-                    "the column of `{name}` is selected only where a mode ends at the first touch, such as `{}`: its gains do \
-                     nothing",
+                    "only modes that end at the first touch select the column of `{name}`, such as `{}`: its gains do nothing",
                     mode.own_name()
                 ),
                 format!("select {components} in a mode that has a contact, {}", without(arm, feature)),
             )
         });
     }
-    let is_selected = || each().any(|(_, one)| one.has_gains_of(feature) && one.column != [0.0; 6]);
-    Some(match column == [0.0; 6] {
-        true => (
+    Some(if column == [0.0; 6] {
+        (
             format!("the column of `{name}` is zero, so its gains do nothing"),
             "write how the sensor should move for it, or remove the feature".to_owned(),
-        ),
-        false if is_selected() => (
+        )
+    } else if each().any(|(_, one)| one.has_gains_of(feature) && one.column != [0.0; 6]) {
+        (
             format!("`{name}` has gains only where no component of its column is selected: they do nothing"),
             format!("give `{name}` a gain in a mode that selects its column, or remove the feature"),
-        ),
-        false => (
+        )
+    } else {
+        (
             format!("no mode selects a component of the column of `{name}`, so its gains do nothing"),
             format!("select {components} in a projector, {}", without(arm, feature)),
-        ),
+        )
     })
 }
 
@@ -63,7 +63,7 @@ fn unused(arm: &Arm<'_>, first: &ModeLaw<'_>, feature: &Feature) -> Option<(Stri
 const TOUCH_MS: f64 = 50.0;
 
 /// Returns whether a mode waits for the contact that a feature measures, and ends there: until then the feature is absent. A
-/// mode that can lose the contact has begun with one.
+/// mode that can lose the contact has begun with one. A `contact_debounce` may say later that there is a contact.
 fn ends_at_touch(arm: &Arm<'_>, mode: &ModeLaw<'_>, feature: &Feature) -> bool {
     let is_of_it = |port: &str| {
         let port = arm.port(port);
@@ -73,7 +73,9 @@ fn ends_at_touch(arm: &Arm<'_>, mode: &ModeLaw<'_>, feature: &Feature) -> bool {
     let is_first = |exit: Exit<'_>| {
         exit.is_found() && exit.when().is_some_and(is_of_it) && exit.number("for_ms").unwrap_or(0.0) <= TOUCH_MS
     };
-    mode.quantity(feature).is_some() && mode.lost().next().is_none() && mode.conditions().any(is_first)
+    let is_late = arm.outline.nodes.iter().any(|node| node.kind.text == "contact_debounce");
+    let has_begun = mode.lost().next().is_some();
+    mode.quantity(feature).is_some() && !is_late && !has_begun && mode.conditions().any(is_first)
 }
 
 /// Returns how to do without the gains of a feature.
