@@ -1,6 +1,6 @@
 //! Controllers in which two things contradict each other: two flags, two setpoints, a setpoint and its limit.
 
-use super::variant::{Variant, leaving, variant, with_feature};
+use super::variant::{Variant, leaving, variant, with_feature, with_force};
 
 /// Features that two flags keep away, a place between two setpoints, and a force just below its limit.
 pub(super) fn poor_pairs() -> Vec<(&'static str, Variant)> {
@@ -58,16 +58,7 @@ pub(super) fn poor_pairs() -> Vec<(&'static str, Variant)> {
                 &["gains.x = { kp = 2.0 }", "set nodes.error.setpoint.beside=0.005"],
             ),
         ),
-        (
-            "unreachable-setpoint",
-            with_feature(
-                "edge",
-                "force",
-                "touch.force",
-                "[0, 0, 0.004, 0, 0, 0]",
-                &["set nodes.error.setpoint.force=14.8", "set limits.force_n=15.0"],
-            ),
-        ),
+        ("unreachable-setpoint", with_force(&["set nodes.error.setpoint.force=14.8", "set limits.force_n=15.0"])),
         // The factor of the schedule is known over the ball, and 1 where the bench states no contact.
         ("opposed-motion", leaving(&[])),
         ("opposed-motion", leaving(&["set facts.arm.contacts=[]"])),

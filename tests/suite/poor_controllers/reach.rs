@@ -1,6 +1,6 @@
 //! Controllers that wait for what never comes, each with the code of its warning.
 
-use super::variant::{Variant, gated, variant, with_feature};
+use super::variant::{Variant, gated, variant, with_force};
 
 /// Forces, places and errors that a mode never reaches, and loops that never get there.
 pub(super) fn never_reached() -> Vec<(&'static str, Variant)> {
@@ -41,13 +41,7 @@ pub(super) fn never_reached() -> Vec<(&'static str, Variant)> {
         // A contact that is lost before its force or its area is as small as that.
         (
             "unreachable-setpoint",
-            with_feature(
-                "edge",
-                "force",
-                "touch.force",
-                "[0, 0, 0.004, 0, 0, 0]",
-                &["set nodes.error.setpoint.force=0.3", "set parts.touch.set.label.min_force=0.4"],
-            ),
+            with_force(&["set nodes.error.setpoint.force=0.3", "set parts.touch.set.label.min_force=0.4"]),
         ),
         ("unreachable-setpoint", banded("edge", band("orientation", "{ inner = 0.5, outer = 1.6 }", "absent"))),
         ("unusual-gain", variant("hybrid", &["gains.x = { kp = 0.0 }"])),

@@ -174,3 +174,8 @@ pub(super) fn with_feature(task: &'static str, name: &str, port: &str, column: &
     let changes = more.into_iter().chain(changes.iter().map(|change| (*change).to_owned())).collect();
     Variant { task, bench: None, changes }
 }
+
+/// The task `edge`, which controls the whole force too.
+pub(super) fn with_force(changes: &[&str]) -> Variant {
+    with_feature("edge", "force", "touch.force", "[0, 0, 0.004, 0, 0, 0]", changes)
+}

@@ -37,8 +37,8 @@ pub(super) struct Spring {
     products: f64,
     /// Sum of the squares of the deflection that is stated, of the same samples [m² s].
     squares: f64,
-    /// How many times as much as stated the arm gives way, by what was measured alone, at the last sample with enough forces;
-    /// 0 before it [1].
+    /// How many times as much as stated the arm gives way, by what was measured alone, at the last sample with enough
+    /// forces; 0 before it [1].
     gives: f64,
     /// Time of contact with enough forces [s].
     learning: f64,

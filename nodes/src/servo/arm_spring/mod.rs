@@ -9,8 +9,8 @@ use crate::motion::normal::{give, lead};
 
 use learned::Spring;
 
-/// Ratio of two stiffnesses from which on the stated one is called wrong: what is learned is within 15 %
-/// of the truth where that was measured (decision 056) [1].
+/// Ratio of two stiffnesses from which on the stated one is called wrong: what is learned is within 15 % of the truth where
+/// that was measured (decision 056) [1].
 const WRONG: f64 = 1.5;
 
 /// Measures how far the force on its pad bends the spring of a compliant arm, and how the arm swings.
@@ -32,8 +32,8 @@ const WRONG: f64 = 1.5;
 /// arm. Then a factor on it is fitted to lead and force, by least squares over the last 2 s of contact. The factor is
 /// between 1/20 and 3. What is stated counts as much as 0.1 s with 1 N at first, and less with each second of contact. So a
 /// wrong stiffness matters while the first press grows, and with 0.3 N for some seconds. The factor stays when the contact
-/// ends. If it is below 2/3 or above 3/2 after a second of contact with enough force, the summary of the run says so, and which
-/// stiffness the joints have, unless the factor is at its bound.
+/// ends. If it is below 2/3 or above 3/2 after a second of contact with enough force, the summary of the run says so, and
+/// which stiffness the joints have, unless the factor is at its bound.
 ///
 /// Both outputs are absent while an input is absent. So they are absent while nothing touches the pad. They are also absent
 /// while the force misses the lead by more than 10 mm, as in a frame of garbage, while all commands are held, for an arm

@@ -114,7 +114,8 @@ fn a_stiffness_that_is_not_the_stated_one_is_found() {
         for _ in 0..5000 {
             cell.step(0.1, times * COMPLIANCE * 0.1);
         }
-        assert!(found.is_none() || found == cell.rig.found(), "{found:?}, then {:?}", cell.rig.found());
+        // The first press alone is too short, and what follows may complete it.
+        assert!(samples < 250 || found == cell.rig.found(), "{found:?}, then {:?}", cell.rig.found());
         found
     };
     assert_eq!(
