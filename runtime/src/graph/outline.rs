@@ -105,7 +105,8 @@ impl OutlineBuilder<'_> {
             name: node.name.clone(),
             wires,
             outputs,
-            sample_s: planned.sample_s,
+            sample_s: planned.sample_times.period,
+            late_s: planned.sample_times.latency,
             ..self.block(&node.block, &spec.params, Some(planned.index))?
         })
     }
@@ -146,6 +147,7 @@ impl OutlineBuilder<'_> {
             settings: self.table(block.params.as_table(), specs, "", node),
             outputs: Vec::new(),
             sample_s: 0.0,
+            late_s: 0.0,
         })
     }
 

@@ -1,6 +1,6 @@
 //! Controllers as an integrator may write them.
 
-use super::variant::{Variant, approaching, cleared, compared, graph, search, variant, with_area, with_feature};
+use super::variant::{Variant, approaching, cleared, compared, graph, on, search, variant, with_area, with_feature};
 
 /// The lines of all gains of a task, with each `kp` and `ki` times a factor.
 fn scaled(task: &'static str, factor: f64) -> Vec<String> {
@@ -340,6 +340,9 @@ pub(super) fn good_by_modes() -> Vec<Variant> {
             "after_ms = 30000, after_travel_mm = 150",
             &["set facts.arm.clear_min_m=[-0.8, -0.4, 0.3]", "set facts.arm.clear_max_m=[-0.3, 0.4, 0.7]"],
         ),
+        // A pad that is late bears less, and one that is not bears more.
+        on("simulated", variant("position", &["set nodes.pid.gains.y.kp=6.0", "set devices.bench.latency_s=0.08"])),
+        on("simulated", variant("position", &["set nodes.pid.gains.y.kp=10.0"])),
         // Springs with much damping bear more, and a schedule leaves a tenth of the gain over steel.
         variant("explore", &["set nodes.pid.gains.x.kp=20.0", "set devices.bench.damping_ratio=0.7"]),
         variant(

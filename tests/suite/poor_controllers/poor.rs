@@ -365,6 +365,14 @@ pub(super) fn at_second_sight() -> Vec<(&'static str, Variant)> {
         ("low-margin", variant("hybrid", &["set live.pid.gains.y.kp.max=11.0"])),
         // The bench states no response of a place, but the arm has springs in its joints.
         ("low-margin", variant("explore", &["set nodes.pid.gains.x.kp=20.0"])),
+        // The bench states no contact, but how late its pad is.
+        (
+            "low-margin",
+            on(
+                "simulated",
+                variant("position", &["set nodes.pid.gains.y.kp=10.0", "set devices.bench.latency_s=0.08"]),
+            ),
+        ),
         // Without a larger gain that keeps the margins.
         (
             "low-margin",

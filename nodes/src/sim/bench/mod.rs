@@ -165,6 +165,7 @@ impl Device for SimBench {
         check::check(&params, arm.joints.joints.len())?;
         let (period, latency) = (period_of(pad.rate_hz), nanos(pad.latency_s));
         let mut description = Description::every(period as f64 * 1e-9);
+        description.latency = pad.latency_s;
         let facts = pad.facts(&model.body.mount)?;
         let (image, vectors) = match &params.vectors {
             None => (pad::fill(description.fills(pad::ROLE), shape.clone(), facts), None),

@@ -157,6 +157,7 @@ impl Device for SimPair {
         let table = Table::new(params.table_height, params.table_friction, &body);
         let period = period_of(pad.rate_hz);
         let mut description = Description::every(period as f64 * 1e-9);
+        description.latency = params.pad.latency_s;
         let noise = [2, 4].map(|stream| Random::new(params.seed, stream));
         let [left_noise, right_noise] = noise;
         let (left, left_arm) = params.side(&mut description, NAMES[0], left, left_noise)?;

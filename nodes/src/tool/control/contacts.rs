@@ -186,6 +186,14 @@ impl Contact {
         self.features.get(feature).cloned().or_else(|| Answer::of_geometry(feature))
     }
 
+    /// Returns the time from a command to the image of its effect, without the period of the samples and without filters
+    /// [s]. Where geometry alone says how the feature answers, it is at least `late_s`, the latency that its device states.
+    pub(crate) fn latency_s(&self, feature: &str, late_s: f64) -> f64 {
+        let own = self.features.get(feature).and_then(|answer| answer.latency_ms);
+        let stated = 1e-3 * own.unwrap_or(self.latency_ms);
+        if self.is_by_geometry(feature) { stated.max(late_s) } else { stated }
+    }
+
     fn check(&self) -> Result<(), String> {
         if !(self.latency_ms >= 0.0 && self.latency_ms.is_finite()) {
             return Err(format!("`latency_ms` is {} ms: write 0 or more", self.latency_ms));
@@ -239,6 +247,15 @@ mod tests {
         assert_eq!(ball.answer("y").unwrap().row(), [0.0, -1.0, 0.0, 0.0, 0.0, 0.0]);
         assert_eq!(ball.answer("force"), None);
         assert_eq!(contacts(&[], "arm"), Ok(Vec::new()));
+    }
+
+    #[test]
+    fn the_latency_of_a_pad_counts_where_geometry_says_how_a_feature_answers() {
+        let read = read(r#"contacts = [{ object = "ball", latency_ms = 4, x = { resonance_hz = 5.0 } }]"#);
+        let ball = &read.unwrap()[0];
+        assert_eq!(["x", "y"].map(|feature| ball.latency_s(feature, 0.08)), [0.004, 0.08]);
+        assert_eq!(ball.latency_s("y", 0.0), 0.004);
+        assert_eq!(Contact::by_geometry().latency_s("x", 0.08), 0.08);
     }
 
     #[test]

@@ -61,6 +61,9 @@ pub(crate) struct Feature {
     /// Nominal time between two samples of its error [s].
     #[serde(skip)]
     pub(crate) period_s: f64,
+    /// Nominal time from its measurement until the sample arrives, as its device states it [s].
+    #[serde(skip)]
+    pub(crate) late_s: f64,
     /// Filters from the measurement to the motion.
     pub(crate) filters: Vec<Filter>,
     /// By how much less the sides of switches smooth that are not followed [s].
@@ -283,9 +286,8 @@ pub(super) fn feature<'a>(nodes: &Nodes<'a>, jacobian: &'a OutlinedBlock, name: 
     let setpoint = error.and_then(|error| setpoint(nodes, &error.name, &name));
     let port = error.and_then(|error| source(error, &name));
     // A role that measures the feature itself has no node; the slowest feature beside it decides then.
-    let period_s = error
-        .zip(port)
-        .map_or(nodes.period(), |(error, port)| nodes.writer(port).map_or(error.sample_s, |node| node.sample_s));
+    let writer = error.zip(port).map(|(error, port)| nodes.writer(port).unwrap_or(error));
+    let [period_s, late_s] = writer.map_or([nodes.period(), 0.0], |node| [node.sample_s, node.late_s]);
     let way = port.map(|port| way(nodes, port));
     let measured = way.as_ref().map(|way| way.measured.clone());
     let spared_s = way.as_ref().map_or(0.0, |way| way.spared_s);
@@ -310,6 +312,7 @@ pub(super) fn feature<'a>(nodes: &Nodes<'a>, jacobian: &'a OutlinedBlock, name: 
         measured,
         setpoint,
         period_s,
+        late_s,
         filters,
         spared_s,
         gates,

@@ -43,13 +43,14 @@ impl Loop {
     /// Returns the loop of a feature over a contact; `None` if neither the bench nor geometry says how the feature
     /// answers the motion of its column, or if a schedule multiplies the gains by what is not known.
     pub(crate) fn over(feature: &Feature, contact: &Contact) -> Option<Self> {
-        let answer = contact.answer(feature.quantity()?)?;
-        let latency_ms = answer.latency_ms.unwrap_or(contact.latency_ms);
+        let quantity = feature.quantity()?;
+        let answer = contact.answer(quantity)?;
+        let latency = contact.latency_s(quantity, feature.late_s);
         let (copies, others): (Vec<&Feature>, Vec<&Feature>) =
             feature.beside.iter().partition(|other| other.is_same_control(feature));
         // The same control that moves the arm by several nodes.
         let column = std::array::from_fn(|i| feature.column[i] + copies.iter().map(|copy| copy.column[i]).sum::<f64>());
-        let around = Self::new(&Feature { column, ..feature.clone() }, &answer, latency_ms * 1e-3);
+        let around = Self::new(&Feature { column, ..feature.clone() }, &answer, latency);
         let factors = feature.schedules.iter().map(|schedule| schedule.factor(contact));
         let factor = factors.product::<Option<f64>>()?;
         let mut beside = Vec::new();
@@ -263,6 +264,7 @@ mod tests {
             column: [0.0, 0.0, 1.0, 0.0, 0.0, 0.0],
             kp: 0.5,
             period_s: 0.004,
+            late_s: 0.0,
             ..Feature::default()
         };
         let response = vec![[0.5, 1.0, 0.0], [3.0, 1.5, -40.0]];
@@ -302,6 +304,7 @@ mod tests {
             ki: 0.4,
             kd: 0.02,
             period_s: 0.004,
+            late_s: 0.0,
             filters: [Shape::Mean { samples: 10.0 }, Shape::LowPass { time: 0.1 }].map(filter).into(),
             ..Feature::default()
         };

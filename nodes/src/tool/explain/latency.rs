@@ -30,8 +30,9 @@ pub(super) struct ToImage {
 /// Returns the latencies of the features that move the arm.
 pub(super) fn latencies(declared: &[Contact], law: &Law) -> Vec<Latency> {
     let over = |feature: &Feature, contact: &Contact| {
-        let answer = contact.answer(feature.quantity()?)?;
-        let stated = 1e-3 * answer.latency_ms.unwrap_or(contact.latency_ms);
+        let quantity = feature.quantity()?;
+        let answer = contact.answer(quantity)?;
+        let stated = contact.latency_s(quantity, feature.late_s);
         let latency_s = Some(stated).filter(|_| answer.response.is_empty());
         (latency_s != Some(0.0)).then(|| ToImage { object: contact.object.clone(), latency_s })
     };

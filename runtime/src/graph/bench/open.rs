@@ -52,6 +52,11 @@ impl OpenedBench {
         self.devices[role.device].description.period
     }
 
+    /// Returns the latency that the device of a role states [s].
+    pub(crate) fn latency(&self, role: &BoundRole) -> f64 {
+        self.devices[role.device].description.latency
+    }
+
     /// Returns the device that fills a role and its side, or `None` if the device has no sides.
     fn side(&self, role: usize) -> Option<(usize, &str)> {
         let bound = self.roles[role].as_ref()?;

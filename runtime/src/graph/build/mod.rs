@@ -6,7 +6,7 @@ mod live;
 mod modes;
 mod nodes;
 mod params;
-mod sample_periods;
+mod sample_times;
 mod tasks;
 
 pub(crate) use live::plan_live;

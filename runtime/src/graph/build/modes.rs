@@ -81,7 +81,7 @@ fn exits(builder: &mut Builder<'_>, nodes: &[PlannedNode]) -> Vec<Vec<PlannedExi
     let poses = poses.filter(|(source, _)| builder.net.roles_of(source.producer).next().is_some());
     let poses: Vec<_> = poses.map(|(source, port)| (source, port.name.as_str())).collect();
     let flat = builder.net.flat;
-    let lost_after = |source: PortRef| default_max_age_ns(builder.sample_periods.of(source.producer));
+    let lost_after = |source: PortRef| default_max_age_ns(builder.sample_times.of(source.producer).period);
     let context = |task: usize| ExitContext {
         net: builder.net,
         task,

@@ -2,7 +2,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use super::sample_periods::SamplePeriods;
+use super::sample_times::AllSampleTimes;
 use crate::graph::bench::{BoundRole, OpenedBench, place_mistakes};
 use crate::graph::check::frames::Frames;
 use crate::graph::check::units::{UnitMismatch, UnitOrigin, Units};
@@ -24,7 +24,7 @@ pub(crate) struct Builder<'a> {
     /// Nominal time between two ticks [s].
     pub(crate) period: f64,
     /// Nominal time between two samples behind each port.
-    pub(super) sample_periods: SamplePeriods,
+    pub(super) sample_times: AllSampleTimes,
     /// Ports whose shape is known so far.
     pub(crate) ports: BTreeMap<PortRef, PlannedPort>,
     /// The unit variables of each node.
@@ -57,7 +57,7 @@ impl<'a> Builder<'a> {
             diagnostics,
             sources,
             period,
-            sample_periods: SamplePeriods::new(net, opened, period),
+            sample_times: AllSampleTimes::new(net, opened, period),
             ports: BTreeMap::new(),
             units: BTreeMap::new(),
             origins: BTreeMap::new(),
@@ -184,7 +184,7 @@ impl Builder<'_> {
         for wire in wires {
             let input = &spec.inputs[wire.input];
             let slowest = &mut given.sample_periods[wire.input];
-            *slowest = slowest.max(self.sample_periods.of(wire.source.producer));
+            *slowest = slowest.max(self.sample_times.of(wire.source.producer).period);
             inputs[wire.input].1.push(PlannedWire {
                 source: wire.source,
                 age: wire.origin.age,
@@ -233,7 +233,7 @@ impl Builder<'_> {
             node: built.node,
             inputs,
             ports,
-            sample_s: self.sample_periods.of(Producer::Node(index)),
+            sample_times: self.sample_times.of(Producer::Node(index)),
             is_every_tick: spec.every_tick,
             is_logged: spec.logs,
             holds: spec.limits.holds,
@@ -384,7 +384,7 @@ impl Builder<'_> {
 
     /// Returns the age limit of a command wire; the default is five periods of the slowest device behind it.
     fn age_limit(&self, wire: &CommandWire) -> AgeLimit {
-        let period = self.sample_periods.of(wire.source.producer);
+        let period = self.sample_times.of(wire.source.producer).period;
         wire.origin.age.unwrap_or(AgeLimit { max_age: default_max_age_ns(period), stale: Policy::Hold })
     }
 }

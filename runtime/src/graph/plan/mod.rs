@@ -60,6 +60,22 @@ pub(crate) struct PlannedWire {
     pub(crate) span: Range<usize>,
 }
 
+/// The nominal times of samples.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct SampleTimes {
+    /// Between two samples, at least the period of the graph [s].
+    pub(crate) period: f64,
+    /// From a measurement until the sample arrives, as the device [states](Description::latency) [s].
+    pub(crate) latency: f64,
+}
+
+impl SampleTimes {
+    /// Returns the longer one of each time.
+    pub(crate) fn max(self, other: Self) -> Self {
+        Self { period: self.period.max(other.period), latency: self.latency.max(other.latency) }
+    }
+}
+
 /// A built node.
 pub(crate) struct PlannedNode {
     /// Its index in the flat graph, which [`Producer::Node`] uses.
@@ -79,8 +95,8 @@ pub(crate) struct PlannedNode {
     pub(crate) fails: Option<usize>,
     /// The innermost task around it.
     pub(crate) task: usize,
-    /// Nominal time between two samples behind its outputs [s].
-    pub(crate) sample_s: f64,
+    /// Times of the samples behind its outputs.
+    pub(crate) sample_times: SampleTimes,
     /// Whether its limits are in raw readings.
     pub(crate) is_uncalibrated: bool,
     /// Span of its name.
