@@ -31,6 +31,9 @@ pub const USUAL_THRESHOLD_N: f64 = 5.0;
 /// Force from which a region counts as a contact [N].
 pub const USUAL_CONTACT_N: f64 = 50.0;
 
+/// Gain of a loop with which the recipe of docs/control.md begins [1/s].
+pub const FIRST_GAIN: f64 = 3.5;
+
 /// Returns a number in `unit` for one that was probably written in a smaller unit, and the name of that unit.
 ///
 /// ```

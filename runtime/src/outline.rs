@@ -133,10 +133,10 @@ pub struct OutlinedBlock {
     /// Nominal time between two samples behind its outputs, at least that between two ticks [s]; 0 for a device.
     #[serde(skip)]
     pub sample_s: f64,
-    /// Nominal time from a measurement until its sample arrives, of the latest device behind its outputs [s]; 0 for a
+    /// Largest latency that a device behind its outputs states, from a measurement until its sample arrives [s]; 0 for a
     /// device.
     #[serde(skip)]
-    pub late_s: f64,
+    pub latency_s: f64,
 }
 
 /// An output of a node.

@@ -154,6 +154,7 @@ fn every_shipped_task_is_explained_for_a_person_and_for_a_page() {
         "`pid` integrates errors of `pressure` up to 0.02 only",
         "At rest: wx, wy, wz.",
         "From a change of the contact to the command: 52 ms for `x`; 2 ms for `y`; 70 ms for `pressure`.",
+        "Latency that the pad states: 4 ms for `x`, `y`, `pressure`. It counts where the bench has measured none.",
         "with the latency of the pad: as in the measured response for `x` over `ball`, `pressure` over `ball`.",
         "`move.contact` (`contact_limit`)",
         "force_n = 15.0",
@@ -165,8 +166,8 @@ fn every_shipped_task_is_explained_for_a_person_and_for_a_page() {
 #[test]
 fn the_latency_is_that_of_the_samples_the_filters_and_the_contact() {
     let facts = "facts.arm.contacts=[{ object = \"pen\", latency_ms = 12.0, y = { vy = -1.0, latency_ms = 5.0 } }]";
-    let slow = "devices.bench.rate_hz=125";
-    let explained = explained(&["graphs/hybrid.toml", "--set", facts, "--set", slow]);
+    let slow = ["--set", "devices.bench.rate_hz=125", "--set", "devices.bench.latency_s=0.03"];
+    let explained = explained(&[&["graphs/hybrid.toml", "--set", facts], &slow[..]].concat());
     let modes = explained["motions"][0]["modes"].as_array().unwrap();
     let of = |mode: &str| modes.iter().find(|one| one["mode"] == mode).unwrap()["latencies"].as_array().unwrap();
     assert!(of("approach").is_empty(), "nothing is controlled");
@@ -176,12 +177,31 @@ fn the_latency_is_that_of_the_samples_the_filters_and_the_contact() {
     {
         assert_eq!(found["feature"], feature);
         let near = |value: &Value, wanted: f64| (value.as_f64().unwrap() - wanted).abs() < 1e-9;
-        assert!(near(&found["to_command_s"], to_command), "{found}");
+        assert!(near(&found["to_command_s"], to_command) && near(&found["of_pad_s"], 0.03), "{found}");
         // The contact does not say how the pressure answers.
         let image = &found["to_image"][0]["latency_s"];
         assert!(to_image.map_or(image.is_null(), |wanted| near(image, wanted)), "{found}");
     }
     assert_eq!(of("servo").len(), 3);
+    let two_arms = say(&["explain", "graphs/carry.toml", "--set", "devices.cell.latency_s=0.02"]).out;
+    assert!(two_arms.contains("Latency that the pad states: 20 ms"), "{two_arms}");
+}
+
+#[test]
+fn a_warning_says_that_a_late_pad_takes_the_phase() {
+    let bench =
+        ["graphs/position.toml", "--bench", "graphs/benches/simulated.toml", "--set", "devices.bench.rate_hz=50"];
+    let checked = |latency: &str| {
+        let set = format!("devices.bench.latency_s={latency}");
+        let args = ["--set", "nodes.pid.gains.y.kp=10.0", "--set", &set];
+        say(&[&["check"], &bench[..], &args].concat()).err
+    };
+    let late = checked("0.08");
+    assert!(late.contains("phase margin 38°; its pad is 80 ms late"), "{late}");
+    // The recipe begins with 0.5 / T, and T is 240 ms and half of a period.
+    let later = checked("0.24");
+    assert!(later.contains("Begin with `kp = 2`, as in the recipe"), "{later}");
+    assert_eq!(checked("0.0"), "");
 }
 
 #[test]

@@ -106,7 +106,7 @@ impl OutlineBuilder<'_> {
             wires,
             outputs,
             sample_s: planned.sample_times.period,
-            late_s: planned.sample_times.latency,
+            latency_s: planned.sample_times.latency,
             ..self.block(&node.block, &spec.params, Some(planned.index))?
         })
     }
@@ -147,7 +147,7 @@ impl OutlineBuilder<'_> {
             settings: self.table(block.params.as_table(), specs, "", node),
             outputs: Vec::new(),
             sample_s: 0.0,
-            late_s: 0.0,
+            latency_s: 0.0,
         })
     }
 

@@ -341,7 +341,13 @@ pub(super) fn good_by_modes() -> Vec<Variant> {
             &["set facts.arm.clear_min_m=[-0.8, -0.4, 0.3]", "set facts.arm.clear_max_m=[-0.3, 0.4, 0.7]"],
         ),
         // A pad that is late bears less, and one that is not bears more.
-        on("simulated", variant("position", &["set nodes.pid.gains.y.kp=6.0", "set devices.bench.latency_s=0.08"])),
+        on(
+            "simulated",
+            variant(
+                "position",
+                &["set nodes.pid.gains.y.kp=6.0", "set devices.bench.rate_hz=50", "set devices.bench.latency_s=0.08"],
+            ),
+        ),
         on("simulated", variant("position", &["set nodes.pid.gains.y.kp=10.0"])),
         // Springs with much damping bear more, and a schedule leaves a tenth of the gain over steel.
         variant("explore", &["set nodes.pid.gains.x.kp=20.0", "set devices.bench.damping_ratio=0.7"]),

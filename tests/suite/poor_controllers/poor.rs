@@ -370,7 +370,14 @@ pub(super) fn at_second_sight() -> Vec<(&'static str, Variant)> {
             "low-margin",
             on(
                 "simulated",
-                variant("position", &["set nodes.pid.gains.y.kp=10.0", "set devices.bench.latency_s=0.08"]),
+                variant(
+                    "position",
+                    &[
+                        "set nodes.pid.gains.y.kp=10.0",
+                        "set devices.bench.rate_hz=50",
+                        "set devices.bench.latency_s=0.08",
+                    ],
+                ),
             ),
         ),
         // Without a larger gain that keeps the margins.

@@ -12,6 +12,8 @@ use tactflow_runtime::node::{
 use tactflow_runtime::signal::{Feature, Features, Freshness, Unit};
 use tactflow_runtime::source::Code;
 
+use crate::usual::FIRST_GAIN;
+
 use law::{Law, Memory};
 
 /// A PID controller on every feature, for force and position control.
@@ -69,8 +71,6 @@ pub struct Params {
 const MAX_STABLE_STEP: f64 = 2.0;
 /// A small error, in the unit of any feature: what a `rise` must answer as fast as kp says.
 const SMALL_ERROR: f64 = 0.001;
-/// Gain with which the recipe of docs/control.md begins [1/s].
-const USUAL_KP: f64 = 3.5;
 /// Smallest gain that is worth a name instead of a larger `rise` [1/s].
 const LEAST_KP: f64 = 1.0;
 /// An error within the noise of each feature [E].
@@ -135,7 +135,7 @@ impl Gains {
                  {SMALL_ERROR} {unit}"
             );
             let most = libm::floor(10.0 * libm::sqrt(rise / (10.0 * SMALL_ERROR))) / 10.0;
-            let help = match self.kp > USUAL_KP && most >= LEAST_KP {
+            let help = match self.kp > FIRST_GAIN && most >= LEAST_KP {
                 true => format!(
                     "write `kp = {most:.1}` or less, which this `rise` can follow. An arm without springs in its joints \
                      needs no `rise`"

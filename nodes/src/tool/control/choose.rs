@@ -98,7 +98,6 @@ mod tests {
             kp: 1.0,
             ki,
             period_s: 1e-4,
-            late_s: 0.0,
             ..Feature::default()
         };
         Loop::new(&feature, &Answer { vz: Some(gain), ..Answer::default() }, delay)
@@ -152,7 +151,6 @@ mod tests {
             column: [0.0, 0.0, 1.0, 0.0, 0.0, 0.0],
             kp,
             period_s: 0.01,
-            late_s: 0.0,
             measured: Some("moments.pressure".into()),
             ..Feature::default()
         };

@@ -186,12 +186,19 @@ impl Contact {
         self.features.get(feature).cloned().or_else(|| Answer::of_geometry(feature))
     }
 
-    /// Returns the time from a command to the image of its effect, without the period of the samples and without filters
-    /// [s]. Where geometry alone says how the feature answers, it is at least `late_s`, the latency that its device states.
-    pub(crate) fn latency_s(&self, feature: &str, late_s: f64) -> f64 {
+    /// Returns the time from a command to the image of its effect that the bench states for a feature, without the period of
+    /// the samples and without filters [s].
+    pub(crate) fn stated_latency_s(&self, feature: &str) -> f64 {
         let own = self.features.get(feature).and_then(|answer| answer.latency_ms);
-        let stated = 1e-3 * own.unwrap_or(self.latency_ms);
-        if self.is_by_geometry(feature) { stated.max(late_s) } else { stated }
+        1e-3 * own.unwrap_or(self.latency_ms)
+    }
+
+    /// Returns the same time as far as it is known: where nothing was measured of this feature that contains the latency of
+    /// its pad, it is at least that, `of_pad` [s].
+    pub(crate) fn latency_s(&self, feature: &str, of_pad: f64) -> f64 {
+        let contains = |answer: &Answer| answer.latency_ms.is_some() || !answer.response.is_empty();
+        let stated = self.stated_latency_s(feature);
+        if self.features.get(feature).is_some_and(contains) { stated } else { stated.max(of_pad) }
     }
 
     fn check(&self) -> Result<(), String> {
@@ -250,12 +257,15 @@ mod tests {
     }
 
     #[test]
-    fn the_latency_of_a_pad_counts_where_geometry_says_how_a_feature_answers() {
-        let read = read(r#"contacts = [{ object = "ball", latency_ms = 4, x = { resonance_hz = 5.0 } }]"#);
+    fn the_latency_of_a_pad_counts_unless_something_measured_contains_it() {
+        let read = read(
+            r#"contacts = [{ object = "ball", latency_ms = 4, x = { resonance_hz = 5.0 }, y = { vy = -1.0, latency_ms = 0 },
+            pressure = { vz = 5.0, response = [[1.0, 1.0, -9.0]] } }]"#,
+        );
         let ball = &read.unwrap()[0];
-        assert_eq!(["x", "y"].map(|feature| ball.latency_s(feature, 0.08)), [0.004, 0.08]);
-        assert_eq!(ball.latency_s("y", 0.0), 0.004);
-        assert_eq!(Contact::by_geometry().latency_s("x", 0.08), 0.08);
+        let found = ["x", "y", "pressure", "angle"].map(|feature| ball.latency_s(feature, 0.08));
+        assert_eq!(found, [0.08, 0.0, 0.004, 0.08]);
+        assert_eq!(ball.latency_s("x", 0.0), 0.004);
     }
 
     #[test]

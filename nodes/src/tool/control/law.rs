@@ -61,9 +61,9 @@ pub(crate) struct Feature {
     /// Nominal time between two samples of its error [s].
     #[serde(skip)]
     pub(crate) period_s: f64,
-    /// Nominal time from its measurement until the sample arrives, as its device states it [s].
+    /// Time from its measurement until the sample arrives, as far as its device states it [s].
     #[serde(skip)]
-    pub(crate) late_s: f64,
+    pub(crate) latency_s: f64,
     /// Filters from the measurement to the motion.
     pub(crate) filters: Vec<Filter>,
     /// By how much less the sides of switches smooth that are not followed [s].
@@ -287,7 +287,7 @@ pub(super) fn feature<'a>(nodes: &Nodes<'a>, jacobian: &'a OutlinedBlock, name: 
     let port = error.and_then(|error| source(error, &name));
     // A role that measures the feature itself has no node; the slowest feature beside it decides then.
     let writer = error.zip(port).map(|(error, port)| nodes.writer(port).unwrap_or(error));
-    let [period_s, late_s] = writer.map_or([nodes.period(), 0.0], |node| [node.sample_s, node.late_s]);
+    let [period_s, latency_s] = writer.map_or([nodes.period(), 0.0], |node| [node.sample_s, node.latency_s]);
     let way = port.map(|port| way(nodes, port));
     let measured = way.as_ref().map(|way| way.measured.clone());
     let spared_s = way.as_ref().map_or(0.0, |way| way.spared_s);
@@ -312,7 +312,7 @@ pub(super) fn feature<'a>(nodes: &Nodes<'a>, jacobian: &'a OutlinedBlock, name: 
         measured,
         setpoint,
         period_s,
-        late_s,
+        latency_s,
         filters,
         spared_s,
         gates,

@@ -186,7 +186,6 @@ mod tests {
             kp,
             ki,
             period_s: period,
-            late_s: 0.0,
             ..Feature::default()
         };
         let (hz, damping) = resonance.unzip();
@@ -260,7 +259,6 @@ mod tests {
             column: [-1.0, 0.0, 0.0, 0.0, 0.0, 0.0],
             kp: k,
             period_s: 1e-4,
-            late_s: 0.0,
             filters: vec![filter(Shape::LowPass { time })],
             ..Feature::default()
         };

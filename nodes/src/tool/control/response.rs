@@ -45,7 +45,7 @@ impl Loop {
     pub(crate) fn over(feature: &Feature, contact: &Contact) -> Option<Self> {
         let quantity = feature.quantity()?;
         let answer = contact.answer(quantity)?;
-        let latency = contact.latency_s(quantity, feature.late_s);
+        let latency = contact.latency_s(quantity, feature.latency_s);
         let (copies, others): (Vec<&Feature>, Vec<&Feature>) =
             feature.beside.iter().partition(|other| other.is_same_control(feature));
         // The same control that moves the arm by several nodes.
@@ -264,7 +264,6 @@ mod tests {
             column: [0.0, 0.0, 1.0, 0.0, 0.0, 0.0],
             kp: 0.5,
             period_s: 0.004,
-            late_s: 0.0,
             ..Feature::default()
         };
         let response = vec![[0.5, 1.0, 0.0], [3.0, 1.5, -40.0]];
@@ -304,7 +303,6 @@ mod tests {
             ki: 0.4,
             kd: 0.02,
             period_s: 0.004,
-            late_s: 0.0,
             filters: [Shape::Mean { samples: 10.0 }, Shape::LowPass { time: 0.1 }].map(filter).into(),
             ..Feature::default()
         };

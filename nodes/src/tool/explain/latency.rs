@@ -14,6 +14,8 @@ pub(super) struct Latency {
     /// From a change of the contact to the command: half of the time between two images on average, and the filters [s].
     /// The latency of the pad is not part of it.
     pub(super) to_command_s: f64,
+    /// Latency that its pad states, from the contact to the arrival of its image [s].
+    pub(super) of_pad_s: f64,
     /// From the command to the image that shows its effect, over each contact that says how the feature answers.
     pub(super) to_image: Vec<ToImage>,
 }
@@ -32,7 +34,7 @@ pub(super) fn latencies(declared: &[Contact], law: &Law) -> Vec<Latency> {
     let over = |feature: &Feature, contact: &Contact| {
         let quantity = feature.quantity()?;
         let answer = contact.answer(quantity)?;
-        let stated = contact.latency_s(quantity, feature.late_s);
+        let stated = contact.stated_latency_s(quantity);
         let latency_s = Some(stated).filter(|_| answer.response.is_empty());
         (latency_s != Some(0.0)).then(|| ToImage { object: contact.object.clone(), latency_s })
     };
@@ -40,6 +42,7 @@ pub(super) fn latencies(declared: &[Contact], law: &Law) -> Vec<Latency> {
     let latency = |feature: &Feature| Latency {
         feature: feature.name.clone(),
         to_command_s: 0.5 * feature.period_s + feature.delay(),
+        of_pad_s: feature.latency_s,
         to_image: declared.iter().filter_map(|contact| over(feature, contact)).collect(),
     };
     moving.map(latency).collect()
@@ -55,6 +58,11 @@ pub(super) fn text(latencies: &[Latency]) -> String {
         "From a change of the contact to the command: {to_command}. This is half of the time between two images, and the \
          filters.\n"
     );
+    let late = latencies.iter().filter(|one| one.of_pad_s > 0.0);
+    let of_pad = grouped(late.map(|one| (Some(one.of_pad_s), format!("`{}`", one.feature))));
+    if !of_pad.is_empty() {
+        let _ = writeln!(text, "Latency that the pad states: {of_pad}. It counts where the bench has measured none.");
+    }
     let of_object = |one: &Latency| {
         let at = |to: &ToImage| (to.latency_s, format!("`{}` over `{}`", one.feature, to.object));
         one.to_image.iter().map(at).collect::<Vec<_>>()

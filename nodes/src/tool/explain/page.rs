@@ -246,9 +246,9 @@ fn loops(loops: &[Stability], style: &Style) -> String {
     if loops.iter().any(|one| one.by_geometry && one.margins.is_some()) {
         let _ = writeln!(
             text,
-            "{GEOMETRY}: the bench states neither resonance nor latency nor response of this feature. Its margins count\n\
-             the latency of the pad, leave out the arm, and are too large. The swing of the arm makes the bandwidth larger,\n\
-             and friction makes it smaller. `tactflow tune` measures this, unless friction hides it."
+            "{GEOMETRY}: the bench states neither resonance nor latency nor response of this feature. Its margins leave out\n\
+             the arm and are too large. The swing of the arm makes the bandwidth larger, and friction makes it smaller.\n\
+             `tactflow tune` measures this, unless friction hides it."
         );
     }
     text += &loops.iter().filter_map(rolling).collect::<String>();

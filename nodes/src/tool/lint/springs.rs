@@ -6,7 +6,7 @@ use tactflow_runtime::source::{Code, Diagnostic, Diagnostics, Edit};
 
 use super::arm::Arm;
 use super::mode_law::ModeLaw;
-use super::stability::{FIRST_GAIN, over};
+use super::stability::{first_gain, over};
 use crate::tool::control::contacts::Contact;
 use crate::tool::control::digits::{down_to_two_digits, to_three_digits};
 use crate::tool::control::law::Feature;
@@ -48,7 +48,7 @@ fn shaken(mode: &ModeLaw<'_>, feature: &Feature, contacts: &[Contact], bears: f6
         over(contact.name()),
         to_three_digits(bears)
     );
-    let first = down_to_two_digits(FIRST_GAIN / gain);
+    let first = down_to_two_digits(first_gain(feature) / gain);
     let help = format!(
         "begin with `kp = {first}`, as in the recipe of docs/control.md, and measure the response with `tactflow tune`"
     );

@@ -11,12 +11,13 @@ use super::faster_filters::{Faster, faster, time_key};
 use super::mode_law::ModeLaw;
 use crate::tool::control::choose::{Wanted, factor};
 use crate::tool::control::contacts::Contact;
-use crate::tool::control::digits::down_to_two_digits;
+use crate::tool::control::digits::{down_to_two_digits, to_three_digits};
 use crate::tool::control::filters::Filter;
 use crate::tool::control::law::Feature;
 use crate::tool::control::margins::{Margins, margins, rough_margins};
 use crate::tool::control::response::Loop;
 use crate::tool::control::shape::Shape;
+use crate::usual::FIRST_GAIN;
 
 /// What a loop has to keep over each contact.
 pub(super) const KEPT: Wanted = Wanted { peak: 1.8, gain_db: 8.0, phase_deg: 0.0 };
@@ -156,6 +157,20 @@ fn figures(margins: &Margins) -> String {
     }
 }
 
+/// Returns what to say of a pad whose latency takes more of the phase than a filter may.
+fn late(feature: &Feature, contacts: &[Contact], low: &Found<'_>) -> String {
+    let counts = || {
+        let contact = contacts.iter().find(|contact| contact.name() == low.object)?;
+        let latency = contact.latency_s(feature.quantity()?, feature.latency_s);
+        Some(latency > 0.0 && latency == feature.latency_s)
+    };
+    let turns = low.judged.margins.crossover_hz.map_or(0.0, |hz| hz * feature.latency_s);
+    match counts().unwrap_or(false) && 360.0 * turns > MAX_LAG {
+        true => format!("; its pad is {} ms late", to_three_digits(1e3 * feature.latency_s)),
+        false => String::new(),
+    }
+}
+
 fn low_margin(
     mode: &ModeLaw<'_>,
     feature: &Feature,
@@ -169,6 +184,7 @@ fn low_margin(
         }
         false => format!("the loop of `{name}` is unstable {}", over(low.object)),
     };
+    let message = message + &late(feature, contacts, low);
     let diagnostic = Diagnostic::new(Code::LowMargin, place, message);
     let diagnostic = match slowest(feature).filter(|_| low.judged.lag > MAX_LAG) {
         Some((_, filter)) => diagnostic.note(
@@ -255,8 +271,10 @@ fn both(feature: &Feature, loops: &[Loop]) -> Option<[f64; 2]> {
     Some([feature.kp * factor, feature.ki * factor * share].map(down_to_two_digits))
 }
 
-/// Gain of a loop with which the recipe of docs/control.md begins [1/s].
-pub(super) const FIRST_GAIN: f64 = 3.5;
+/// Returns the gain of a loop with which the recipe of docs/control.md begins [1/s]: 0.5 / T, with all delays T.
+pub(super) fn first_gain(feature: &Feature) -> f64 {
+    (0.5 / (feature.delay() + feature.latency_s + 0.5 * feature.period_s)).min(FIRST_GAIN)
+}
 
 /// Returns what to say of gains that are chosen by geometry, because the bench does not say how the object answers. A
 /// `kp` above that of the recipe is not named without it.
@@ -268,7 +286,7 @@ pub(super) fn unmeasured(
 ) -> Option<String> {
     let contact = contacts.iter().find(|contact| contact.name() == object)?;
     let quantity = feature.quantity().filter(|quantity| contact.is_by_geometry(quantity))?;
-    let first = FIRST_GAIN / contact.answer(quantity)?.along(&feature.column).abs();
+    let first = first_gain(feature) / contact.answer(quantity)?.along(&feature.column).abs();
     let begin = kp.filter(|kp| first < *kp).map_or_else(String::new, |_| {
         format!("Begin with `kp = {}`, as in the recipe of docs/control.md. ", down_to_two_digits(first))
     });

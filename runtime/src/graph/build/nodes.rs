@@ -23,7 +23,7 @@ pub(crate) struct Builder<'a> {
     pub(super) sources: SourceMap,
     /// Nominal time between two ticks [s].
     pub(crate) period: f64,
-    /// Nominal time between two samples behind each port.
+    /// Times of the samples behind each port.
     pub(super) sample_times: AllSampleTimes,
     /// Ports whose shape is known so far.
     pub(crate) ports: BTreeMap<PortRef, PlannedPort>,

@@ -1,4 +1,4 @@
-//! The times of the samples behind each port: those of the slowest and of the latest device whose samples it waits for.
+//! The times of the samples behind each port: the longest ones of all devices whose samples it waits for.
 //!
 //! Only wires that wake a node count, as for the stamp of a value: what a node samples makes its outputs no older.
 
