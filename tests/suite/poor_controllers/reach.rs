@@ -26,6 +26,7 @@ pub(super) fn never_reached() -> Vec<(&'static str, Variant)> {
     ];
     vec![
         ("unreachable-setpoint", banded("edge", band("pressure", "{ inner = 0.05, outer = 0.2 }", "absent"))),
+        ("unreachable-setpoint", banded("force", band("pressure", "{ inner = 0.05, outer = 0.09 }", "absent"))),
         ("unreachable-setpoint", banded("position", band("x", "{ inner = 0.05, outer = 0.06 }", "absent"))),
         ("windup", banded("edge", band("orientation", "{ inner = 0.01, outer = 0.02 }", "zero"))),
         ("unreachable-setpoint", variant("position", &window)),
@@ -38,6 +39,7 @@ pub(super) fn never_reached() -> Vec<(&'static str, Variant)> {
         ),
         ("unreachable-setpoint", variant("force", &["set parts.touch.set.label.min_force=16.0"])),
         ("unreachable-setpoint", variant("hold_without_slip", &["set nodes.grip.least_force=20.0"])),
+        ("unreachable-setpoint", variant("hold_without_slip", &["setpoint = { spare = -0.7 }"])),
         // A contact that is lost before its force or its area is as small as that.
         (
             "unreachable-setpoint",
@@ -46,6 +48,7 @@ pub(super) fn never_reached() -> Vec<(&'static str, Variant)> {
         ("unreachable-setpoint", banded("edge", band("orientation", "{ inner = 0.5, outer = 1.6 }", "absent"))),
         ("unusual-gain", variant("hybrid", &["gains.x = { kp = 0.0 }"])),
         ("unusual-gain", variant("rolling", &["gains.x = { kp = 2.0, limit = 0.0001 }"])),
+        ("unusual-gain", variant("hybrid", &["linear_m_per_s2 = 0.02"])),
         ("unusual-gain", variant("edge", &["gains.pressure = { kd = 0.05 }"])),
         ("unusual-gain", variant("hybrid", &["columns.x = [-0.001, 0, 0, 0, 0, 0]"])),
         (

@@ -63,7 +63,7 @@ fn slow(arm: &Arm<'_>, mode: &ModeLaw<'_>, feature: &Feature) -> Option<Diagnost
 
 /// Returns the largest change of a feature for one unit of its control, as the contacts of the bench or geometry say;
 /// `None` if the column rolls, and no contact states how far a place moves then.
-fn largest_gain(arm: &Arm<'_>, feature: &Feature, quantity: &str) -> Option<f64> {
+pub(super) fn largest_gain(arm: &Arm<'_>, feature: &Feature, quantity: &str) -> Option<f64> {
     let stated: Vec<&Answer> = arm.contacts.iter().filter_map(|contact| contact.features.get(quantity)).collect();
     let rolls = |i: &usize| feature.column[*i] != 0.0 && !stated.iter().any(|answer| answer.row()[*i] != 0.0);
     if matches!(quantity, "x" | "y") && [3, 4].iter().any(rolls) {

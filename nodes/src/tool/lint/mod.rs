@@ -27,15 +27,18 @@
 //! | does a projector select what nothing moves? | `idle_axes` |
 //! | is a column used in no mode? | `unused_columns` |
 //! | does a gain do harm whatever is touched? | `gains` |
+//! | does a limit of the acceleration stop a place too late? | `braking` |
 //! | is a loop near instability over a contact? | `stability` |
 //! | is a loop too fast for an arm with springs in its joints? | `springs` |
 //! | may a change while the arm moves make one unstable? | `live` |
 //!
-//! `reach` asks `exit_bounds` and `deadbands`, `gains` asks `deadbands`, and `live` and `springs` ask `stability`.
+//! `reach` asks `exit_bounds` and `deadbands`, `gains` asks `deadbands`, `braking` asks `gains`, and `live` and `springs`
+//! ask `stability`.
 
 mod approach;
 mod arm;
 mod blind;
+mod braking;
 mod contacts;
 mod deadbands;
 mod exit_bounds;
@@ -69,7 +72,7 @@ use arm::{Arm, carried};
 use mode_law::ModeLaw;
 
 /// The checks of an arm, in the order of their warnings.
-const CHECKS: [fn(&Arm<'_>) -> Diagnostics; 12] = [
+const CHECKS: [fn(&Arm<'_>) -> Diagnostics; 13] = [
     contacts::misnamed,
     touches,
     reach::check,
@@ -79,6 +82,7 @@ const CHECKS: [fn(&Arm<'_>) -> Diagnostics; 12] = [
     presence::check,
     columns,
     gains::check,
+    braking::check,
     springs::check,
     stability::check,
     live::check,
