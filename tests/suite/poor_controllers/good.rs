@@ -340,18 +340,6 @@ pub(super) fn good_by_modes() -> Vec<Variant> {
             "after_ms = 30000, after_travel_mm = 150",
             &["set facts.arm.clear_min_m=[-0.8, -0.4, 0.3]", "set facts.arm.clear_max_m=[-0.3, 0.4, 0.7]"],
         ),
-        // A gentle arm, a wide deadband, and a spare force that is held.
-        variant("hybrid", &["linear_m_per_s2 = 0.05"]),
-        variant(
-            "force",
-            &[
-                "set nodes.band.type=\"deadband\"",
-                "set nodes.band.in.error=\"error.error\"",
-                "set nodes.band.width.pressure={ inner = 0.04, outer = 0.08 }",
-                "set nodes.pid.in.error=\"band.error\"",
-            ],
-        ),
-        variant("hold_without_slip", &["setpoint = { spare = 0.3 }"]),
         // A pad that is late bears less, and one that is not bears more.
         on(
             "simulated",

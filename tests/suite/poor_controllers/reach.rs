@@ -26,7 +26,6 @@ pub(super) fn never_reached() -> Vec<(&'static str, Variant)> {
     ];
     vec![
         ("unreachable-setpoint", banded("edge", band("pressure", "{ inner = 0.05, outer = 0.2 }", "absent"))),
-        ("unreachable-setpoint", banded("force", band("pressure", "{ inner = 0.05, outer = 0.09 }", "absent"))),
         ("unreachable-setpoint", banded("position", band("x", "{ inner = 0.05, outer = 0.06 }", "absent"))),
         ("windup", banded("edge", band("orientation", "{ inner = 0.01, outer = 0.02 }", "zero"))),
         ("unreachable-setpoint", variant("position", &window)),
@@ -39,7 +38,6 @@ pub(super) fn never_reached() -> Vec<(&'static str, Variant)> {
         ),
         ("unreachable-setpoint", variant("force", &["set parts.touch.set.label.min_force=16.0"])),
         ("unreachable-setpoint", variant("hold_without_slip", &["set nodes.grip.least_force=20.0"])),
-        ("unreachable-setpoint", variant("hold_without_slip", &["setpoint = { spare = -0.7 }"])),
         // A contact that is lost before its force or its area is as small as that.
         (
             "unreachable-setpoint",

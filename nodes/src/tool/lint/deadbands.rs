@@ -7,9 +7,6 @@ use super::mode_law::ModeLaw;
 use crate::tool::control::digits::to_two_digits;
 use crate::tool::control::law::Feature;
 
-/// Share of the largest error from which on a deadband lets a feature rest almost wherever it is [1].
-const MOST: f64 = 0.9 - 1e-9;
-
 /// Returns the warning about a deadband in which a feature always rests, or for good once the contact is lost.
 pub(super) fn always_resting(arm: &Arm<'_>, mode: &ModeLaw<'_>, feature: &Feature) -> Option<Diagnostic> {
     let band = mode.deadband(feature)?;
@@ -18,11 +15,11 @@ pub(super) fn always_resting(arm: &Arm<'_>, mode: &ModeLaw<'_>, feature: &Featur
     let largest = arm.largest_error(mode, feature);
     let why = match mode.quantity(feature)? {
         "pressure" | "force" if feature.setpoint == Some(largest) => {
-            format!("without a contact its error is {largest}, so once it rests it hardly presses any more")
+            format!("without a contact its error is {largest}, so once it rests it presses no more")
         }
-        _ => format!("no error is larger than {largest}, so it rests almost wherever the contact is"),
+        _ => format!("no error is larger than {largest}, so it rests wherever the contact is"),
     };
-    if outer < MOST * largest {
+    if outer < largest {
         return None;
     }
     let message = format!("`{name}` rests up to an error of {outer}, but {why}");

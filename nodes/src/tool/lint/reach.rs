@@ -16,7 +16,6 @@ pub(super) fn check(arm: &Arm<'_>) -> Diagnostics {
     let mut found = Diagnostics::new();
     for mode in &arm.modes {
         found.extend(mode.moving().filter_map(|feature| unreachable_setpoint(arm, mode, feature)));
-        found.extend(mode.moving().filter_map(|feature| slipping(mode, feature)));
         found.extend(mode.moving().filter_map(|feature| always_resting(arm, mode, feature)));
         found.extend(mode.moving().filter_map(|feature| beside_window(mode, feature)));
         found.extend(exit_bounds(arm, mode));
@@ -144,18 +143,6 @@ pub(super) fn unreachable_setpoint(arm: &Arm<'_>, mode: &ModeLaw<'_>, feature: &
             ),
         ),
     };
-    Some(Diagnostic::new(Code::UnreachableSetpoint, mode.place_of_setpoint(feature)?, message).help(help))
-}
-
-/// Returns the warning about a setpoint of the spare force with which the sensor presses less than friction needs.
-fn slipping(mode: &ModeLaw<'_>, feature: &Feature) -> Option<Diagnostic> {
-    let setpoint = feature.setpoint.filter(|setpoint| *setpoint < 0.0 && mode.quantity(feature) == Some("spare"))?;
-    let message = format!(
-        "the setpoint of `{}` is {setpoint} N: the sensor presses less than the `keep_margin` of its `friction_margin` needs, \
-         and the object may slip",
-        feature.name
-    );
-    let help = "write 0 or more; for a smaller force, write a smaller `keep_margin`";
     Some(Diagnostic::new(Code::UnreachableSetpoint, mode.place_of_setpoint(feature)?, message).help(help))
 }
 
