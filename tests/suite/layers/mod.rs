@@ -92,7 +92,7 @@ const NODES: &[(&str, &[&str])] = &[
     ("devices", &["arm", "builtin", "motion", "recordings", "usual", "devices"]),
     ("sim", &["arm", "devices", "motion", "usual", "roles", "sim"]),
     ("wires", &["builtin", "devices"]),
-    ("tool", &["arm", "builtin", "calibration", "devices", "motion", "recordings", "sim", "touch", "tool"]),
+    ("tool", &["arm", "builtin", "calibration", "devices", "motion", "recordings", "sim", "touch", "usual", "tool"]),
 ];
 
 /// The folder a file stands in; a file beside `lib.rs` is a room of its own.
