@@ -18,9 +18,11 @@ fn scaled(task: &'static str, factor: f64) -> Vec<String> {
     text.lines().filter(|line| line.starts_with("gains.")).map(scale).collect()
 }
 
-/// Good controllers with loops through a delay, and with sides of a switch that other modes use.
+/// Good controllers behind a small limit, with loops through a delay, and with sides of a switch that other modes use.
 pub(super) fn good_behind_nodes() -> Vec<Variant> {
     vec![
+        // A gentle arm stops in time if it moves slowly: y goes on by 0.4 mm.
+        variant("hybrid", &["linear_m_per_s2 = 0.02", "set limits.linear_m_per_s=0.01"]),
         // The last value is held through a delay, which closes a loop.
         variant(
             "hybrid",

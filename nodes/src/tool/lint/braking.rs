@@ -52,8 +52,9 @@ fn too_late(arm: &Arm<'_>, mode: &ModeLaw<'_>, feature: &Feature) -> Option<Diag
     let name = &feature.name;
     let message = format!(
         "{}the limit `{key}` of {limit} m/s² stops `{name}` too late: its loop has a gain of {rate:.1} 1/s, so the place goes \
-         on beyond its setpoint by more than a tenth of an error of 10 mm",
-        mode.prefix()
+         on beyond its setpoint by more than {:.1} mm",
+        mode.prefix(),
+        100.0 * error
     );
     let most = down_to_two_digits(feature.kp * (limit / (IN_TIME * needed)).sqrt());
     let least = to_two_digits(IN_TIME * needed, libm::ceil);
